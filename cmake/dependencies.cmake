@@ -1,0 +1,20 @@
+# Debian's packages as imported targets. Heavy headers stay private to one .cpp each.
+find_package(Threads REQUIRED)
+find_package(glm REQUIRED)
+find_package(TBB REQUIRED)
+find_package(fmt REQUIRED)
+find_package(ZLIB REQUIRED)
+find_package(PNG REQUIRED)
+find_package(OpenEXR REQUIRED CONFIG)
+find_package(Imath REQUIRED CONFIG)
+find_package(nlohmann_json REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(Vulkan REQUIRED)
+find_package(OpenSSL REQUIRED COMPONENTS Crypto)
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
+
+# libvulkan-volk-dev ships the loader as one C file; it is compiled once here.
+find_file(VOLK_SOURCE volk.c PATHS /usr/include REQUIRED)
+add_library(volk STATIC ${VOLK_SOURCE})
+target_link_libraries(volk PUBLIC Vulkan::Headers ${CMAKE_DL_LIBS})

@@ -1,0 +1,8 @@
+# mote_module(NAME DEPS...): static library mote_NAME from the sources of the calling folder.
+function(mote_module name)
+  file(GLOB sources CONFIGURE_DEPENDS *.cpp *.h)
+  add_library(mote_${name} STATIC ${sources})
+  set_target_properties(mote_${name} PROPERTIES LINKER_LANGUAGE CXX)
+  target_link_libraries(mote_${name} PUBLIC mote_options)
+  target_link_libraries(mote_${name} ${ARGN})
+endfunction()

@@ -1,0 +1,236 @@
+#include "engine/vulkan/device.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "engine/vulkan/check.h"
+#include "engine/vulkan/structure.h"
+#include "host/core/error.h"
+
+namespace mote {
+namespace {
+
+struct QueueFamily {
+  std::uint32_t index, timestampBits;
+};
+
+QueueFamily graphicsAndCompute(VkPhysicalDevice device) {
+  std::uint32_t count = 0;
+  vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
+  std::vector<VkQueueFamilyProperties> families(count);
+  vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
+  constexpr VkQueueFlags kNeeded = VK_QUEUE_GRAPHICS_BIT | VK_QUEUE_COMPUTE_BIT;
+  for (std::uint32_t i = 0; i < count; ++i)
+    if ((families[i].queueFlags & kNeeded) == kNeeded) return {i, families[i].timestampValidBits};
+  throw MachineError("the Vulkan device has no queue with graphics and compute");
+}
+
+VkBool32 shaderFloat64(VkPhysicalDevice physicalDevice) {
+  VkPhysicalDeviceFeatures features;
+  vkGetPhysicalDeviceFeatures(physicalDevice, &features);
+  return features.shaderFloat64;
+}
+
+VkDevice createLogicalDevice(VkPhysicalDevice physicalDevice, std::uint32_t queueFamily) {
+  auto v13 = structure<VkPhysicalDeviceVulkan13Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES);
+  v13.dynamicRendering = v13.synchronization2 = v13.maintenance4 = VK_TRUE;
+  auto v12 = structure<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
+  v12.pNext = &v13;
+  v12.bufferDeviceAddress = v12.scalarBlockLayout = v12.hostQueryReset = VK_TRUE;
+  auto features = structure<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
+  features.pNext = &v12;
+  features.features.geometryShader = features.features.independentBlend = VK_TRUE;
+  features.features.fullDrawIndexUint32 = features.features.shaderInt64 = VK_TRUE;
+  features.features.shaderFloat64 = shaderFloat64(physicalDevice);
+
+  const float priority = 1;
+  auto queue = structure<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
+  queue.queueFamilyIndex = queueFamily;
+  queue.queueCount = 1;
+  queue.pQueuePriorities = &priority;
+  auto info = structure<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO);
+  info.pNext = &features;
+  info.queueCreateInfoCount = 1;
+  info.pQueueCreateInfos = &queue;
+  VkDevice device = VK_NULL_HANDLE;
+  vkCheck(vkCreateDevice(physicalDevice, &info, nullptr, &device), "vkCreateDevice");
+  return device;
+}
+
+}  // namespace
+
+Device::Device(VkPhysicalDevice physicalDevice, bool stageAlways)
+    : physicalDevice_(physicalDevice), stageAlways_(stageAlways) {
+  auto buffers =
+      structure<VkPhysicalDeviceMaintenance4Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES);
+  auto allocations =
+      structure<VkPhysicalDeviceMaintenance3Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES);
+  allocations.pNext = &buffers;
+  auto properties = structure<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
+  properties.pNext = &allocations;
+  vkGetPhysicalDeviceProperties2(physicalDevice, &properties);
+  name_ = properties.properties.deviceName;
+  cpu_ = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+  float64_ = shaderFloat64(physicalDevice) != VK_FALSE;
+  limits_ = properties.properties.limits;
+  maxBuffer_ = buffers.maxBufferSize;
+  maxAllocation_ = allocations.maxMemoryAllocationSize;
+  vkGetPhysicalDeviceMemoryProperties(physicalDevice, &memory_);
+
+  const QueueFamily family = graphicsAndCompute(physicalDevice);
+  queueFamily_ = family.index;
+  timestampBits_ = family.timestampBits;
+  device_ = createLogicalDevice(physicalDevice, queueFamily_);
+  vkGetDeviceQueue(device_, queueFamily_, 0, &queue_);
+  auto pool = structure<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
+  pool.flags = VK_COMMAND_POOL_CREATE_TRANSIENT_BIT;
+  pool.queueFamilyIndex = queueFamily_;
+  const VkResult result = vkCreateCommandPool(device_, &pool, nullptr, &pool_);
+  if (result != VK_SUCCESS) vkDestroyDevice(device_, nullptr);
+  vkCheck(result, "vkCreateCommandPool");
+}
+
+Device::~Device() {
+  vkDestroyCommandPool(device_, pool_, nullptr);
+  vkDestroyDevice(device_, nullptr);
+}
+
+std::uint64_t Device::memoryBytes() const {
+  std::uint64_t largest = 0;
+  for (std::uint32_t i = 0; i < memory_.memoryHeapCount; ++i)
+    if (memory_.memoryHeaps[i].flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT)
+      largest = std::max<std::uint64_t>(largest, memory_.memoryHeaps[i].size);
+  return largest;
+}
+
+std::uint64_t Device::maxBufferBytes() const { return std::min({maxBuffer_, maxAllocation_, memoryBytes()}); }
+
+std::uint32_t Device::memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags flags,
+                                 VkMemoryPropertyFlags preferred) const {
+  // Vulkan lists types with fewer properties first, so of two that match alike the first asks no more than needed.
+  std::uint32_t best = memory_.memoryTypeCount;
+  int bestMatch = -1;
+  for (std::uint32_t i = 0; i < memory_.memoryTypeCount; ++i) {
+    const VkMemoryPropertyFlags has = memory_.memoryTypes[i].propertyFlags;
+    if (!(typeBits & (1u << i)) || (has & flags) != flags) continue;
+    const int match = std::popcount(has & preferred);
+    if (match > bestMatch) best = i, bestMatch = match;
+  }
+  if (best == memory_.memoryTypeCount)
+    throw MachineError(
+        fmt::format("{} has no memory type with the properties {:#x} among the types {:#x}", name_, flags, typeBits));
+  return best;
+}
+
+void Device::allocate(const VkMemoryRequirements& needs, std::uint32_t type, VkMemoryAllocateFlags flags,
+                      const char* what, VkDeviceMemory* memory) const {
+  const std::uint32_t heap = memory_.memoryTypes[type].heapIndex;
+  const std::uint64_t heapBytes = memory_.memoryHeaps[heap].size;
+  const std::string numbers =
+      fmt::format("{} bytes asked for {}, heap {} of {} has {} bytes, one allocation at most {}", needs.size, what,
+                  heap, name_, heapBytes, maxAllocation_);
+  // Asking for more than these is invalid use of Vulkan, so the answer that a driver might give is given here.
+  const bool tooLarge = needs.size > heapBytes || needs.size > maxAllocation_;
+  auto flagsInfo = structure<VkMemoryAllocateFlagsInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO);
+  flagsInfo.flags = flags;
+  auto info = structure<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
+  info.pNext = &flagsInfo;
+  info.allocationSize = needs.size;
+  info.memoryTypeIndex = type;
+  vkCheck(tooLarge ? VK_ERROR_OUT_OF_DEVICE_MEMORY : vkAllocateMemory(device_, &info, nullptr, memory),
+          "vkAllocateMemory", numbers);
+}
+
+Buffer Device::createBuffer(VkDeviceSize bytes, Memory memory) const {
+  if (bytes > maxBuffer_)
+    throw MachineError(fmt::format("a buffer of {} bytes is beyond the maxBufferSize of {}, {} bytes; its heap has {}",
+                                   bytes, name_, maxBuffer_, memoryBytes()));
+  Buffer buffer;
+  buffer.memory_ = DeviceHandle<VkDeviceMemory, &vkFreeMemory>(device_);
+  buffer.buffer_ = DeviceHandle<VkBuffer, &vkDestroyBuffer>(device_);
+  buffer.size_ = bytes;
+
+  auto info = structure<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
+  info.size = std::max<VkDeviceSize>(bytes, 16);  // a buffer of 0 bytes does not exist in Vulkan, but an array does
+  info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT |
+               VK_BUFFER_USAGE_INDEX_BUFFER_BIT | VK_BUFFER_USAGE_VERTEX_BUFFER_BIT |
+               VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
+               VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+  vkCheck(vkCreateBuffer(device_, &info, nullptr, buffer.buffer_.out()), "vkCreateBuffer",
+          fmt::format("{} bytes", bytes));
+  VkMemoryRequirements needs;
+  vkGetBufferMemoryRequirements(device_, buffer.handle(), &needs);
+
+  constexpr VkMemoryPropertyFlags kMappable =
+      VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+  const bool host = memory == Memory::Host;
+  const std::uint32_t type = host ? memoryType(needs.memoryTypeBits, kMappable, VK_MEMORY_PROPERTY_HOST_CACHED_BIT)
+                                  : memoryType(needs.memoryTypeBits, 0, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
+  allocate(needs, type, VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT, "a buffer", buffer.memory_.out());
+  vkCheck(vkBindBufferMemory(device_, buffer.handle(), buffer.memory_.get(), 0), "vkBindBufferMemory");
+
+  const bool mappable = (memory_.memoryTypes[type].propertyFlags & kMappable) == kMappable;
+  if (host || (mappable && !stageAlways_))
+    vkCheck(vkMapMemory(device_, buffer.memory_.get(), 0, VK_WHOLE_SIZE, 0, &buffer.data_), "vkMapMemory",
+            fmt::format("{} bytes", bytes));
+  auto address = structure<VkBufferDeviceAddressInfo>(VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO);
+  address.buffer = buffer.handle();
+  buffer.address_ = vkGetBufferDeviceAddress(device_, &address);
+  return buffer;
+}
+
+Image2D Device::createImage(std::uint32_t width, std::uint32_t height, VkFormat format) const {
+  const std::uint32_t limit = limits_.maxImageDimension2D;
+  if (width > limit || height > limit)
+    throw MachineError(fmt::format("a picture of {} x {} pixels is beyond the maxImageDimension2D of {}, {}", width,
+                                   height, name_, limit));
+  Image2D image;
+  image.memory_ = DeviceHandle<VkDeviceMemory, &vkFreeMemory>(device_);
+  image.image_ = DeviceHandle<VkImage, &vkDestroyImage>(device_);
+  image.view_ = DeviceHandle<VkImageView, &vkDestroyImageView>(device_);
+  image.format_ = format;
+  image.width_ = width;
+  image.height_ = height;
+
+  auto info = structure<VkImageCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO);
+  info.imageType = VK_IMAGE_TYPE_2D;
+  info.format = format;
+  info.extent = {width, height, 1};
+  info.mipLevels = info.arrayLayers = 1;
+  info.samples = VK_SAMPLE_COUNT_1_BIT;
+  info.tiling = VK_IMAGE_TILING_OPTIMAL;
+  info.usage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT;
+  info.initialLayout = VK_IMAGE_LAYOUT_UNDEFINED;
+  const std::string what = fmt::format("a picture of {} x {} pixels", width, height);
+  vkCheck(vkCreateImage(device_, &info, nullptr, image.image_.out()), "vkCreateImage", what);
+  VkMemoryRequirements needs;
+  vkGetImageMemoryRequirements(device_, image.handle(), &needs);
+  allocate(needs, memoryType(needs.memoryTypeBits, 0, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT), 0, what.c_str(),
+           image.memory_.out());
+  vkCheck(vkBindImageMemory(device_, image.handle(), image.memory_.get(), 0), "vkBindImageMemory", what);
+
+  auto view = structure<VkImageViewCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO);
+  view.image = image.handle();
+  view.viewType = VK_IMAGE_VIEW_TYPE_2D;
+  view.format = format;
+  view.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+  vkCheck(vkCreateImageView(device_, &view, nullptr, image.view_.out()), "vkCreateImageView", what);
+  return image;
+}
+
+TimestampQueries Device::createTimestampQueries(std::uint32_t spans) const {
+  MOTE_CHECK(spans, >, 0u);
+  TimestampQueries queries;
+  queries.pool_ = DeviceHandle<VkQueryPool, &vkDestroyQueryPool>(device_);
+  queries.capacity_ = spans;
+  queries.secondsPerTick_ = static_cast<double>(limits_.timestampPeriod) * 1e-9;
+  queries.tickMask_ = timestampBits_ >= 64 ? ~0ull : (1ull << timestampBits_) - 1;
+  auto info = structure<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
+  info.queryType = VK_QUERY_TYPE_TIMESTAMP;
+  info.queryCount = 2 * spans;
+  vkCheck(vkCreateQueryPool(device_, &info, nullptr, queries.pool_.out()), "vkCreateQueryPool");
+  queries.reset();
+  return queries;
+}
+
+}  // namespace mote

@@ -1,0 +1,101 @@
+// The logical device: the only factory of everything that lives on it.
+#pragma once
+#include <volk.h>
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/vulkan/buffer.h"
+#include "engine/vulkan/command_buffer.h"
+#include "engine/vulkan/compute_pipeline.h"
+#include "engine/vulkan/graphics_pipeline.h"
+#include "engine/vulkan/image.h"
+#include "engine/vulkan/shader_module.h"
+#include "engine/vulkan/timestamp_queries.h"
+
+namespace mote {
+
+/// One queue with graphics and compute, one command pool; for one thread. Outlives all it made.
+class Device {
+ public:
+  /// A device from chooseDevice, which has checked that nothing is missing. `stageAlways` keeps Memory::Device buffers
+  /// unmapped even where they could be mapped: it makes a CPU device behave as a discrete one does.
+  explicit Device(VkPhysicalDevice physicalDevice, bool stageAlways = false);
+  ~Device();
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
+
+  VkDevice handle() const { return device_; }
+  const std::string& name() const { return name_; }
+  /// A software device (lavapipe): many elements an invocation suit it, workgroup barriers do not.
+  bool isCpu() const { return cpu_; }
+  /// Double precision in shaders: optional, what needs it does without.
+  bool hasFloat64() const { return float64_; }
+  const VkPhysicalDeviceLimits& limits() const { return limits_; }
+  /// Largest buffer that can be made [bytes]; a bigger array must be streamed in parts.
+  std::uint64_t maxBufferBytes() const;
+  /// Size of the device-local heap [bytes].
+  std::uint64_t memoryBytes() const;
+
+  /// Throws MachineError with the bytes asked for and the heap's size. 0 bytes is a valid buffer.
+  Buffer createBuffer(VkDeviceSize bytes, Memory memory = Memory::Device) const;
+  /// Throws MachineError when larger than maxImageDimension2D or memory is short.
+  Image2D createImage(std::uint32_t width, std::uint32_t height, VkFormat format) const;
+  ShaderModule createShaderModule(std::span<const std::uint32_t> spirv) const;
+  ComputePipeline createComputePipeline(std::span<const std::uint32_t> spirv, std::uint32_t pushConstantBytes,
+                                        std::span<const SpecializationConstant> constants = {}) const;
+  GraphicsPipeline createGraphicsPipeline(const GraphicsPipelineInfo& info) const;
+  TimestampQueries createTimestampQueries(std::uint32_t spans) const;
+
+  /// Starts recording; end with submitAndWait.
+  CommandBuffer beginCommands() const;
+  /// Makes all writes visible to the host, submits, and returns when the device is done. Throws MachineError.
+  void submitAndWait(CommandBuffer commands) const;
+  /// Records with `record` and does both.
+  void run(const std::function<void(CommandBuffer&)>& record) const;
+
+  /// Copies bytes into the buffer: at once where it is mapped, else through a staging buffer of at most 64 MiB.
+  void uploadBytes(const Buffer& to, VkDeviceSize offset, const void* data, std::size_t bytes) const;
+  void downloadBytes(const Buffer& from, VkDeviceSize offset, void* data, std::size_t bytes) const;
+  template <class T>
+  void upload(const Buffer& to, std::span<const T> data, std::size_t firstElement = 0) const {
+    uploadBytes(to, firstElement * sizeof(T), data.data(), data.size_bytes());
+  }
+  template <class T>
+  std::vector<T> download(const Buffer& from, std::size_t count, std::size_t firstElement = 0) const {
+    std::vector<T> data(count);
+    downloadBytes(from, firstElement * sizeof(T), data.data(), count * sizeof(T));
+    return data;
+  }
+  /// A buffer of Memory::Device that holds `data`.
+  template <class T>
+  Buffer createBufferWith(std::span<const T> data) const {
+    Buffer buffer = createBuffer(data.size_bytes());
+    upload(buffer, data);
+    return buffer;
+  }
+
+ private:
+  /// Index of the memory type that has `flags`, is allowed by `typeBits` and has most of `preferred`.
+  std::uint32_t memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags flags, VkMemoryPropertyFlags preferred) const;
+  void allocate(const VkMemoryRequirements& needs, std::uint32_t type, VkMemoryAllocateFlags flags, const char* what,
+                VkDeviceMemory* memory) const;
+  void createLayout(VkShaderStageFlags stages, std::uint32_t pushConstantBytes, VkPipelineLayout* layout) const;
+
+  VkPhysicalDevice physicalDevice_;
+  bool stageAlways_;
+  std::string name_;
+  bool cpu_ = false, float64_ = false;
+  VkPhysicalDeviceLimits limits_{};
+  VkPhysicalDeviceMemoryProperties memory_{};
+  std::uint64_t maxAllocation_ = 0, maxBuffer_ = 0;
+  std::uint32_t queueFamily_ = 0, timestampBits_ = 0;
+  VkDevice device_ = VK_NULL_HANDLE;
+  VkQueue queue_ = VK_NULL_HANDLE;
+  VkCommandPool pool_ = VK_NULL_HANDLE;
+};
+
+}  // namespace mote

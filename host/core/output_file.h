@@ -1,0 +1,32 @@
+// An output file appears whole or not at all: written beside its place, then renamed.
+#pragma once
+#include <string>
+
+namespace mote {
+
+/// Usage: OutputFile file("a.exr"); write to file.temporaryPath(); file.commit(). Without commit (an exception, say)
+/// the temporary is removed and whatever stood at the path before stays.
+class OutputFile {
+ public:
+  /// Throws InputError when the folder is missing or not a folder, the path is a folder, or it cannot be written.
+  explicit OutputFile(std::string path);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  /// Same folder, name starting with '.', ending in the same extension, unique to this process and object.
+  const std::string& temporaryPath() const { return temporary_; }
+  const std::string& path() const { return path_; }
+
+  /// Flushes to disk and renames. Throws MachineError when the disk refuses.
+  void commit();
+
+ private:
+  std::string path_, temporary_;
+  bool committed_ = false;
+};
+
+/// Writes `bytes` through an OutputFile; throws as it does, and MachineError ("disk full", with the byte count).
+void writeWholeFile(const std::string& path, const std::string& bytes);
+
+}  // namespace mote

@@ -1,0 +1,98 @@
+#include "host/image/compare.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host/core/error.h"
+#include "host/image/png.h"
+
+namespace mote {
+namespace {
+
+void checkSizes(const Image& a, const Image& b) {
+  if (a.width != b.width || a.height != b.height)
+    throw InputError("second picture", "size", fmt::format("{} × {}, as the first", a.width, a.height),
+                     fmt::format("{} × {}", b.width, b.height));
+}
+
+/// Sums of one channel, or of all four.
+struct Sums {
+  double squares = 0, absolutes = 0;
+  std::size_t count = 0;
+  ChannelDifference result;
+
+  void add(double difference, int x, int y) {
+    squares += difference * difference, absolutes += difference, ++count;
+    if (difference > result.max) result.max = difference, result.maxX = x, result.maxY = y;
+  }
+  ChannelDifference finish() {
+    if (count > 0) result.rmse = std::sqrt(squares / count), result.mean = absolutes / count;
+    return result;
+  }
+};
+
+nlohmann::json jsonOf(const ChannelDifference& c) {
+  return {
+      {"rmse", c.rmse}, {"mean", c.mean}, {"max", c.max}, {"max_at", {c.maxX, c.maxY}}, {"not_finite", c.notFinite}};
+}
+
+}  // namespace
+
+ImageDifference compareImages(const Image& a, const Image& b) {
+  checkSizes(a, b);
+  Sums channel[4], all;
+  std::size_t within = 0;
+  for (int y = 0; y < a.height; ++y)
+    for (int x = 0; x < a.width; ++x) {
+      const vec4 &p = a.at(x, y), &q = b.at(x, y);
+      bool finite = true, near = true;
+      double difference[4];
+      for (int c = 0; c < 4; ++c) {
+        difference[c] = std::fabs(double(p[c]) - double(q[c]));
+        if (!std::isfinite(difference[c])) finite = false, ++channel[c].result.notFinite;
+        near = near && difference[c] <= kPixelTolerance;
+      }
+      if (!finite) {
+        ++all.result.notFinite;
+        continue;
+      }
+      within += near;
+      for (int c = 0; c < 4; ++c) channel[c].add(difference[c], x, y), all.add(difference[c], x, y);
+    }
+  ImageDifference out;
+  out.width = a.width, out.height = a.height;
+  for (int c = 0; c < 4; ++c) out.channel[c] = channel[c].finish();
+  out.overall = all.finish();
+  if (!a.pixels.empty()) out.within = double(within) / double(a.pixels.size());
+  out.psnr = -20 * std::log10(out.overall.rmse);
+  return out;
+}
+
+std::string differenceJson(const ImageDifference& d) {
+  nlohmann::ordered_json json;
+  json["width"] = d.width, json["height"] = d.height;
+  json["rmse"] = d.overall.rmse, json["mean"] = d.overall.mean, json["max"] = d.overall.max;
+  json["max_at"] = {d.overall.maxX, d.overall.maxY};
+  json["not_finite"] = d.overall.notFinite;
+  json["tolerance"] = kPixelTolerance, json["within"] = d.within;
+  json["psnr"] = std::isfinite(d.psnr) ? nlohmann::ordered_json(d.psnr) : nlohmann::ordered_json(nullptr);
+  const char* const names[] = {"R", "G", "B", "A"};
+  for (int c = 0; c < 4; ++c) json["channels"][names[c]] = jsonOf(d.channel[c]);
+  return json.dump(2) + "\n";
+}
+
+void writeDifferencePng(const std::string& path, const Image& a, const Image& b, float gain) {
+  checkSizes(a, b);
+  std::vector<std::uint8_t> rgb(a.pixels.size() * 3);
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+    const vec4 difference = glm::abs(a.pixels[i] - b.pixels[i]);
+    const float sum = difference.x + difference.y + difference.z + difference.w;
+    for (int c = 0; c < 3; ++c) {
+      const float value = std::isfinite(sum) ? gain * std::max(difference[c], difference.w) : c != 1;
+      rgb[3 * i + c] = static_cast<std::uint8_t>(std::min(value, 1.0f) * 255 + 0.5f);
+    }
+  }
+  writePngBytes(path, rgb, a.width, a.height);
+}
+
+}  // namespace mote

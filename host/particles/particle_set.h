@@ -1,0 +1,32 @@
+// The particles of one frame, in scene space, as the octree and the lighting take them.
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "host/core/vec.h"
+
+namespace mote {
+
+/// Structure of arrays. Every array has size() entries or, where the remark says so, none.
+struct ParticleSet {
+  std::vector<vec3> position;      ///< centre [scene units], finite
+  std::vector<float> radius;       ///< support radius r [scene units], finite, > 0
+  std::vector<float> density;      ///< channel Density: cross-section [scene units²], or optical depth in mode `peak`; finite, ≥ 0
+  std::vector<vec3> color;         ///< scattering albedo, RGB; empty: all of them `uniformColor`
+  std::vector<vec3> velocity;      ///< [scene units / s]; empty: no source has it
+  std::vector<std::uint64_t> id;   ///< empty: no source has it
+  vec3 uniformColor{1};
+
+  std::size_t size() const { return position.size(); }
+  Bounds bounds() const;           ///< of the centres
+  Bounds supportBounds() const;    ///< of the supports
+};
+
+/// Mean, least and greatest support radius.
+struct RadiusRange {
+  float min = 0, mean = 0, max = 0;
+};
+RadiusRange radiusRange(const ParticleSet& set);
+
+}  // namespace mote

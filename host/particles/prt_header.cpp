@@ -1,0 +1,282 @@
+#include "host/particles/prt_header.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <set>
+
+#include "host/core/error.h"
+#include "host/core/log.h"
+
+namespace mote {
+namespace {
+
+// No producer comes near; it keeps the buffer that one particle needs small whatever an arity claims.
+constexpr std::uint64_t kMaxParticleBytes = 1 << 20;
+
+// A value in a message: printable characters only, and not more than a line of them.
+std::string shown(std::string_view raw) {
+  std::string text = "'";
+  for (const char c : raw.substr(0, 40)) text += c >= 32 && c < 127 ? std::string(1, c) : fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
+  return text + (raw.size() > 40 ? "…'" : "'");
+}
+
+/// A window of the file that cannot be left: every read is checked against what the section has.
+class Section {
+ public:
+  Section(const std::string& path, std::FILE* file, std::uint64_t begin, std::uint64_t end)
+      : path_(path), file_(file), at_(begin), end_(end) {}
+
+  std::uint64_t position() const { return at_; }
+  std::uint64_t left() const { return end_ - at_; }
+
+  std::string bytes(std::uint64_t count, const char* what) {
+    if (count > left())
+      throw InputError(path_, what, fmt::format("{} bytes at byte {}", count, at_), fmt::format("only {}", left()),
+                       "the file is cut off or its header is damaged");
+    std::string buffer(count, '\0');
+    if (std::fread(buffer.data(), 1, buffer.size(), file_) != buffer.size())
+      throw MachineError(fmt::format("{}: reading {} bytes at byte {} failed", path_, count, at_));
+    at_ += count;
+    return buffer;
+  }
+
+  template <class T>
+  T number(const char* what) {
+    const std::string raw = bytes(sizeof(T), what);
+    T value;
+    std::memcpy(&value, raw.data(), sizeof value);
+    return value;
+  }
+
+  void skip(std::uint64_t count) {  // count ≤ left(), checked by the callers, who know the field's name
+    if (fseeko(file_, static_cast<off_t>(count), SEEK_CUR) != 0)
+      throw MachineError(fmt::format("{}: seeking to byte {} failed", path_, at_ + count));
+    at_ += count;
+  }
+
+ private:
+  const std::string& path_;
+  std::FILE* file_;
+  std::uint64_t at_, end_;
+};
+
+struct Parser {
+  const std::string& path;
+  std::FILE* file;
+  std::uint64_t fileBytes;
+  PrtHeader header{};
+
+  [[noreturn]] void fail(std::string_view field, std::string_view expected, std::string_view got,
+                         std::string_view hint = {}) const {
+    throw InputError(path, field, expected, got, hint);
+  }
+
+  /// Bytes 0 to 56; returns the header's length.
+  std::uint64_t parseFixed() {
+    Section section(path, file, 0, fileBytes);
+    const std::string magic = section.bytes(sizeof kPrtMagic, "PRT magic number");
+    if (magic.compare(0, 5, "\xC0PRT2") == 0)
+      fail("", "a PRT 1.0 or 1.1 file", "PRT 2", "this version of mote cannot read PRT 2 yet; save it as PRT 1.1");
+    if (std::memcmp(magic.data(), kPrtMagic, sizeof kPrtMagic) != 0)
+      fail("", "a PRT file, which starts with the bytes C0 50 52 54 0D 0A 1A 0A", shown(magic),
+           "is it another format, or was it sent as text?");
+    const auto length = section.number<std::int32_t>("header length");
+    const std::string signature = section.bytes(sizeof kPrtSignature, "signature");
+    if (std::memcmp(signature.data(), kPrtSignature, sizeof kPrtSignature) != 0)
+      fail("signature", "'Extensible Particle Format', padded with zeros", shown(signature));
+    const auto version = section.number<std::int32_t>("version");
+    if (version != 1 && version != 2) fail("version", "1 (PRT 1.0) or 2 (PRT 1.1)", fmt::format("{}", version));
+    header.minorVersion = version - 1;
+    const auto count = section.number<std::int64_t>("particle count");
+    if (count == -1)
+      fail("particle count", "0 or more", "-1",
+           "the file was not closed correctly: the program writing it crashed or is still running");
+    if (count < 0) fail("particle count", "0 or more", fmt::format("{}", count));
+    header.count = static_cast<std::uint64_t>(count);
+    if (length < static_cast<std::int32_t>(kPrtFixedHeader))
+      fail("header length", fmt::format("at least {} bytes", kPrtFixedHeader), fmt::format("{}", length));
+    if (static_cast<std::uint64_t>(length) > fileBytes)
+      fail("header length", fmt::format("at most the file's {} bytes", fileBytes), fmt::format("{}", length),
+           "the file is cut off or its header is damaged");
+    return static_cast<std::uint64_t>(length);
+  }
+
+  /// Chunks of a 1.1 header, up to `Stop`. Leaves the file at `end`.
+  void parseChunks(std::uint64_t end) {
+    Section section(path, file, kPrtFixedHeader, end);
+    while (true) {
+      if (section.left() == 0) fail("metadata", "a Stop chunk at its end", "none before the channels");
+      const std::string kind = section.bytes(4, "metadata chunk type");
+      const auto length = section.number<std::int32_t>("metadata chunk length");
+      if (length < 0 || static_cast<std::uint64_t>(length) > section.left())
+        fail(fmt::format("metadata chunk {} at byte {}", shown(kind), section.position() - 8),
+             fmt::format("a length of 0 to {} bytes, what is left of the header", section.left()),
+             fmt::format("{}", length));
+      const auto size = static_cast<std::uint64_t>(length);
+      if (kind == "Stop") {
+        if (size != 0) fail("metadata chunk 'Stop'", "a length of 0", fmt::format("{}", length));
+        if (section.left() > 0)
+          logWarning(fmt::format("{}: ignored {} bytes behind the metadata's Stop chunk", path, section.left()));
+        section.skip(section.left());
+        return;
+      }
+      if (kind == "Meta")
+        parseMeta(section.bytes(size, "metadata"));
+      else
+        section.skip(size);
+    }
+  }
+
+  std::string takeName(std::string_view& rest, const char* what) const {
+    const std::size_t zero = rest.substr(0, 32).find('\0');
+    if (zero == std::string_view::npos)
+      fail(fmt::format("metadata {}", what), "at most 31 characters and a zero", shown(rest.substr(0, 32)));
+    std::string name(rest.substr(0, zero));
+    rest.remove_prefix(zero + 1);
+    return name;
+  }
+
+  void parseMeta(const std::string& chunk) {
+    std::string_view rest = chunk;
+    PrtMetadata value;
+    value.channel = takeName(rest, "channel name");
+    value.name = takeName(rest, "value name");
+    // Old Sequoia files name channel values "Channel.Prop" in the file's scope.
+    if (const auto dot = value.name.find('.'); value.channel.empty() && dot != std::string::npos) {
+      value.channel = value.name.substr(0, dot);
+      value.name.erase(0, dot + 1);
+    }
+    const std::string field = fmt::format("metadata {}", value.channel.empty() ? shown(value.name) : shown(value.channel + "." + value.name));
+    if (!value.channel.empty() && !prtNameIsValid(value.channel)) fail(field, "a channel's name", shown(value.channel));
+    if (value.name.empty()) fail(field, "a name", "an empty one");
+    if (rest.size() < 4) fail(field, "a type of 4 bytes", fmt::format("{} bytes", rest.size()));
+    std::memcpy(&value.type, rest.data(), 4);
+    rest.remove_prefix(4);
+    if (value.type == kPrtText) {
+      const std::size_t zero = rest.find('\0');
+      if (zero == std::string_view::npos) fail(field, "text with a zero at its end", "none");
+      value.bytes = rest.substr(0, zero);
+    } else {
+      if (value.type < 0 || value.type >= kPrtTypes)
+        fail(field, "a type of 0 to 10, or -1 for text", fmt::format("{}", value.type));
+      const std::size_t size = prtTypeSize(static_cast<PrtType>(value.type));
+      if (rest.size() % size != 0)
+        fail(field, fmt::format("a multiple of {} bytes ({})", size, prtTypeName(static_cast<PrtType>(value.type))),
+             fmt::format("{} bytes", rest.size()));
+      value.bytes = rest;
+    }
+    if (header.meta(value.channel, value.name)) {
+      logWarning(fmt::format("{}: {} stands twice in the metadata; the first is kept", path, field));
+      return;
+    }
+    header.metadata.push_back(std::move(value));
+  }
+
+  /// The channel table behind the header. Returns where the particles begin.
+  std::uint64_t parseChannels(std::uint64_t begin) {
+    Section section(path, file, begin, fileBytes);
+    const auto reserved = section.number<std::int32_t>("reserved number");
+    if (reserved != 4) fail("reserved number", "4", fmt::format("{}", reserved));
+    const auto count = section.number<std::int32_t>("channel count");
+    const auto record = section.number<std::int32_t>("channel record length");
+    if (count < 1) fail("channel count", "1 or more", fmt::format("{}", count));
+    if (record < static_cast<std::int32_t>(kPrtChannelRecord))
+      fail("channel record length", fmt::format("at least {} bytes", kPrtChannelRecord), fmt::format("{}", record));
+    const std::uint64_t needed = static_cast<std::uint64_t>(count) * static_cast<std::uint64_t>(record);
+    if (needed > section.left())
+      fail("channel table", fmt::format("{} records of {} bytes", count, record),
+           fmt::format("only {} bytes in the file", section.left()), "the file is cut off or its header is damaged");
+    std::set<std::string> names;
+    for (std::int32_t i = 0; i < count; ++i) {
+      PrtChannel channel = parseChannel(section, i);
+      section.skip(static_cast<std::uint64_t>(record) - kPrtChannelRecord);
+      if (!names.insert(channel.name).second)
+        fail(fmt::format("channel {}", i), "a name of its own", fmt::format("'{}' a second time", channel.name));
+      header.channels.push_back(std::move(channel));
+    }
+    checkLayout();
+    return section.position();
+  }
+
+  PrtChannel parseChannel(Section& section, std::int32_t index) const {
+    const std::string name = section.bytes(32, "channel name");
+    const auto type = section.number<std::int32_t>("channel type");
+    const auto arity = section.number<std::int32_t>("channel arity");
+    const auto offset = section.number<std::int32_t>("channel offset");
+    const std::size_t zero = name.find('\0');
+    if (zero == std::string::npos)
+      fail(fmt::format("channel {}: name", index), "at most 31 characters and a zero", shown(name));
+    PrtChannel channel;
+    channel.name = name.substr(0, zero);
+    if (!prtNameIsValid(channel.name))
+      fail(fmt::format("channel {}: name", index), "a letter or '_', then letters, digits and '_'", shown(channel.name));
+    const std::string field = fmt::format("channel '{}'", channel.name);
+    if (type < 0 || type >= kPrtTypes) fail(field + ": type", "0 to 10", fmt::format("{}", type));
+    if (arity < 1) fail(field + ": arity", "1 or more", fmt::format("{}", arity));
+    if (offset < 0) fail(field + ": offset", "0 or more", fmt::format("{}", offset));
+    channel.type = static_cast<PrtType>(type);
+    channel.arity = static_cast<std::uint32_t>(arity);
+    channel.offset = static_cast<std::uint32_t>(offset);
+    if (channel.offset + std::uint64_t{channel.bytes()} > kMaxParticleBytes)
+      fail(field, fmt::format("an end within {} bytes of the particle's start", kMaxParticleBytes),
+           fmt::format("offset {}, {} × {}", offset, arity, prtTypeName(channel.type)));
+    return channel;
+  }
+
+  /// Gaps are legal, overlaps are not.
+  void checkLayout() {
+    std::vector<const PrtChannel*> order;
+    for (const PrtChannel& c : header.channels) order.push_back(&c);
+    std::sort(order.begin(), order.end(), [](auto a, auto b) { return a->offset < b->offset; });
+    const PrtChannel* before = nullptr;
+    for (const PrtChannel* c : order) {
+      if (before && c->offset < header.particleBytes)
+        fail(fmt::format("channel '{}': offset", c->name),
+             fmt::format("at least {}, the end of '{}'", header.particleBytes, before->name),
+             fmt::format("{}", c->offset), "channels overlap");
+      header.particleBytes = c->offset + c->bytes();
+      before = c;
+    }
+  }
+
+  /// What metadata say about channels, once these are known.
+  void checkChannelMetadata() {
+    auto& all = header.metadata;
+    for (const PrtMetadata& m : all) {
+      if (m.channel.empty()) continue;
+      const PrtChannel* channel = header.channel(m.channel);
+      if (!channel)
+        logWarning(fmt::format("{}: dropped metadata '{}' of '{}', a channel that the file does not have", path, m.name, m.channel));
+      else if (m.name == "Interpretation")
+        checkInterpretation(m, *channel);
+    }
+    std::erase_if(all, [&](const PrtMetadata& m) { return !m.channel.empty() && !header.channel(m.channel); });
+  }
+
+  void checkInterpretation(const PrtMetadata& m, const PrtChannel& channel) const {
+    if (m.type != static_cast<std::int32_t>(PrtType::I32) || m.bytes.size() != 4) return;  // somebody else's property
+    std::int32_t kind;
+    std::memcpy(&kind, m.bytes.data(), 4);
+    if ((kind == 4 || kind == 5) && channel.arity != 4)
+      fail(fmt::format("metadata '{}.Interpretation'", channel.name),
+           fmt::format("arity 4 for {}", kind == 4 ? "an orientation" : "a rotation"), fmt::format("{}", channel.arity));
+  }
+};
+
+}  // namespace
+
+ParsedPrtHeader parsePrtHeader(const std::string& path, std::FILE* file, std::uint64_t fileBytes) {
+  Parser parser{path, file, fileBytes};
+  const std::uint64_t length = parser.parseFixed();
+  if (parser.header.minorVersion == 1)
+    parser.parseChunks(length);
+  else if (fseeko(file, static_cast<off_t>(length), SEEK_SET) != 0)
+    throw MachineError(fmt::format("{}: seeking to byte {} failed", path, length));
+  const std::uint64_t dataBegin = parser.parseChannels(length);
+  parser.checkChannelMetadata();
+  return {std::move(parser.header), dataBegin};
+}
+
+}  // namespace mote

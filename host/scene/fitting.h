@@ -1,0 +1,16 @@
+// What a scene leaves open, chosen from where its particles are: the camera and one key light.
+#pragma once
+#include "host/core/vec.h"
+#include "host/scene/scene.h"
+
+namespace mote {
+
+/// Fills in what `scene` marks as fitted; calls after the first change nothing. `supportBounds`: of the particles'
+/// supports, finite, not empty (MOTE_CHECK).
+///  * camera.fitted: position and target so that the whole box is in the picture, with a margin of 5 % at each side, at
+///    the scene's fov, up and output size, from slightly above; fittedDepths: near and far around the box.
+///  * defaultLights: a point light "key" behind the box, to the upper left as the camera sees it. Its intensity makes a
+///    white, isotropic, unshadowed scatterer at the box's centre have radiance 1: I = 4π d².
+void fitDefaults(Scene& scene, const Bounds& supportBounds);
+
+}  // namespace mote

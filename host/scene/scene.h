@@ -1,0 +1,135 @@
+// A scene as plain data: what ../../scenes/scene.schema.json describes, parsed, checked and with every default filled
+// in. Angles in degrees, lengths in scene units, times in seconds. Nothing here opens a particle file.
+#pragma once
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/core/vec.h"
+
+namespace mote {
+
+/// How a particle source's support radius is chosen.
+struct RadiusRule {
+  enum class Kind { Auto, Number, Channel };
+  Kind kind = Kind::Auto;  ///< Auto: the file's Radius channel if it has one, else 1.5 × mean distance to the nearest 8
+  float value = 0;         ///< Number: the radius [scene units], > 0
+  std::string channel = "Radius";  ///< Channel: its name in the file
+  float scale = 1;                 ///< Channel: factor, > 0
+
+  bool operator==(const RadiusRule&) const = default;
+};
+
+enum class Generator { None, Ball, Cloud, Plume };
+
+struct ParticleSource {
+  std::string pointer;  ///< where it stands in the scene, "/particles/0": the place of messages
+  std::string file;     ///< path as opened (relative paths resolved), may hold ####; empty if generated
+  Generator generate = Generator::None;
+  std::uint64_t count = 0;  ///< generated particles, 1 … 4e9
+  std::uint64_t seed = 0;
+  RadiusRule radius;
+  std::map<std::string, std::string> channels;  ///< ours → theirs
+  float density = 1;                            ///< used where the file has no Density
+  vec3 color{1};                                ///< used where the file has no Color
+  vec3 translate{0}, rotate{0};  ///< rotate: degrees about x, then y, then z; order: scale, rotate, translate
+  float scale = 1;               ///< > 0; radii and velocities scale with it, cross-sections with its square
+
+  bool operator==(const ParticleSource&) const = default;
+};
+
+enum class DensityMode { CrossSection, Peak };
+enum class Falloff { Smooth, Linear, Sphere };
+enum class Endpoint { Soft, Clamp };
+
+struct Medium {
+  DensityMode densityMode = DensityMode::CrossSection;
+  float densityScale = 1;             ///< ≥ 0
+  std::optional<float> opticalDepth;  ///< instead of densityScale: mean τ of straight lines through the particles, > 0
+  Falloff falloff = Falloff::Smooth;
+  vec3 albedo{0.95f};  ///< 0–1, multiplies Color
+
+  bool operator==(const Medium&) const = default;
+};
+
+enum class LightType { Point, Directional };
+
+struct LightSource {
+  std::string name;  ///< unique; letters, digits, '_' (it becomes a channel name)
+  LightType type = LightType::Point;
+  vec3 position{0};          ///< point
+  vec3 direction{0, -1, 0};  ///< directional: of travel; unit length after parsing
+  vec3 color{1};             ///< ≥ 0
+  float strength = 1;        ///< point: intensity [W/sr]; directional: irradiance [W/m²]; ≥ 0
+  float decay = 2;           ///< point: 0–2
+  float shadowDensity = 1;   ///< ≥ 0
+  bool castsShadows = true;
+
+  bool operator==(const LightSource&) const = default;
+};
+
+enum class Backend { Auto, Cpu, Gpu };
+
+struct LightingSettings {
+  Backend backend = Backend::Auto;
+  float cutoff = 1e-4f;  ///< 0 ≤ cutoff < 1: a ray may stop once its transmittance is below
+  Endpoint endpoint = Endpoint::Soft;
+  std::uint32_t particlesPerCell = 0;  ///< 0: auto
+
+  bool operator==(const LightingSettings&) const = default;
+};
+
+struct Camera {
+  bool fitted = false;        ///< true: no position and no target given; fitDefaults() places it by the bounding box
+  bool fittedDepths = false;  ///< true: fitted, and neither near nor far given; fitDefaults() sets both
+  vec3 position{0, 1, 4}, target{0, 0.5f, 0}, up{0, 1, 0};
+  float fov = 40;                  ///< vertical, 0 < fov < 180
+  float near = 0.01f, far = 1000;  ///< depths; particles whose centre lies outside are not drawn
+
+  bool operator==(const Camera&) const = default;
+};
+
+struct View {
+  Backend backend = Backend::Auto;
+
+  bool operator==(const View&) const = default;
+};
+
+enum class Precision { Half, Float };
+enum class Compression { None, Rle, Zips, Zip, Piz };
+
+struct Output {
+  std::string file = "mote.####.exr";  ///< relative to the working folder if from a flag, else to the scene
+  ivec2 size{1280, 720};               ///< 1 … 16384 each
+  Precision precision = Precision::Half;
+  Compression compression = Compression::Zip;
+  bool depth = false;  ///< layer Z asked for in "aovs"
+
+  bool operator==(const Output&) const = default;
+};
+
+struct Frames {
+  int first = 1, last = 1, step = 1;  ///< last ≥ first, step ≥ 1
+  float fps = 24;
+
+  bool operator==(const Frames&) const = default;
+};
+
+struct Scene {
+  std::string path;  ///< as given; the place in messages
+  std::vector<ParticleSource> particles;
+  Medium medium;
+  bool defaultLights = false;  ///< true: the scene gave no "lights"; one key light is fitted to the bounding box
+  std::vector<LightSource> lights;
+  LightingSettings lighting;
+  Camera camera;
+  View view;
+  Output output;
+  Frames frames;
+
+  bool operator==(const Scene&) const = default;
+};
+
+}  // namespace mote

@@ -1,0 +1,30 @@
+// What every subcommand of `mote` shares: one file each, registered by name in main.cpp.
+#pragma once
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace mote {
+
+/// The flags that stand before or after any subcommand.
+struct CommonOptions {
+  unsigned threads = 0;     ///< 0: one a core
+  std::string device;       ///< Vulkan device by number or part of its name; empty: the best
+  bool validate = false;    ///< validation and synchronization layers on; any message makes the command fail with 3
+  bool quiet = false, verbose = false;
+};
+
+// Each adds its subcommand with its flags; the callback runs the command and throws as the library does. The int that a
+// command reports through `exitCode` is 0, or 1 where a comparison failed.
+void addRenderCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
+void addLightCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
+void addCrosscheckCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
+void addGenerateCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
+void addInfoCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
+void addCompareCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
+void addBenchCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
+void addDevicesCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
+
+}  // namespace mote
