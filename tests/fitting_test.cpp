@@ -99,6 +99,14 @@ TEST(Fitting, LeavesWhatTheSceneGives) {
   EXPECT_NE(depths.camera.position, Camera{}.position);
 }
 
+TEST(Fitting, KeepsTheFirstFramesCameraAndLightOverASequence) {
+  Scene scene = parseScene(kLeast, "s.json");
+  fitDefaults(scene, {vec3(-1), vec3(1)});
+  const Scene first = scene;
+  fitDefaults(scene, {vec3(-5), vec3(9)});
+  EXPECT_EQ(scene, first);
+}
+
 TEST(Fitting, HandlesASinglePointAnywhere) {
   for (const vec3 point : {vec3(0), vec3(1e6f, -1e6f, 3), vec3(1e-20f)}) {
     Scene scene = parseScene(kLeast, "s.json");

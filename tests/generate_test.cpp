@@ -1,5 +1,5 @@
-// Generated particles: the same on any number of threads, statistically what they claim, and a plume that moves as its own
-// velocities say.
+// Generated particles: the same on any number of threads, statistically what they claim, and a plume that moves as its
+// own velocities say.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -80,7 +80,8 @@ TEST(GenerateBall, IsUniform) {
     mean += dvec3(p);
     const double r = glm::length(dvec3(p));
     ASSERT_LE(r, 1 + 1e-6);
-    // Uniform in the ball: r³ is uniform, and so is the cosine with any axis, here one that is none of the coordinates'.
+    // Uniform in the ball: r³ is uniform, and so is the cosine with any axis, here one that is none of the
+    // coordinates'.
     ++shells[std::min(kBins - 1, static_cast<int>(r * r * r * kBins))];
     const double cosine = glm::dot(dvec3(p), glm::normalize(dvec3(1, 2, -3))) / r;
     ++slices[glm::clamp(static_cast<int>((0.5 + 0.5 * cosine) * kBins), 0, kBins - 1)];
@@ -89,8 +90,9 @@ TEST(GenerateBall, IsUniform) {
   EXPECT_LT(glm::length(mean) / kCount, 5 * std::sqrt(0.6 / kCount));
   for (const auto* bins : {shells, slices}) {
     double chiSquared = 0;
-    for (int b = 0; b < kBins; ++b) chiSquared += std::pow(bins[b] - double(kCount) / kBins, 2) / (double(kCount) / kBins);
-    EXPECT_LT(chiSquared, 66);  // 19 degrees of freedom: exceeded once in two million
+    for (int b = 0; b < kBins; ++b)
+      chiSquared += std::pow(bins[b] - double(kCount) / kBins, 2) / (double(kCount) / kBins);
+    EXPECT_LT(chiSquared, 66);   // 19 degrees of freedom: exceeded once in two million
     EXPECT_GT(chiSquared, 1.9);  // and below this as rarely: the numbers are random, not spread by a rule
   }
 }
@@ -104,11 +106,13 @@ TEST(GenerateBall, HasMeanOpticalDepth4AlongADiameter) {
     const dvec3 direction = random.direction();
     for (std::size_t i = 0; i < ball.size(); ++i) {
       const dvec3 p(ball.position[i]);
-      const double along = glm::dot(p, direction), s = (glm::dot(p, p) - along * along) / (double(ball.radius[i]) * ball.radius[i]);
+      const double along = glm::dot(p, direction),
+                   s = (glm::dot(p, p) - along * along) / (double(ball.radius[i]) * ball.radius[i]);
       if (s < 1) sum += ball.density[i] * 3 / (kPi * double(ball.radius[i]) * ball.radius[i]) * (1 - s) * (1 - s);
     }
   }
-  // A line meets about 350 particles with unequal weights: 7 % a line, 0.5 % for 200; all lines share the centre, hence 3 %.
+  // A line meets about 350 particles with unequal weights: 7 % a line, 0.5 % for 200; all lines share the centre, hence
+  // 3 %.
   EXPECT_NEAR(sum / kLines, 4, 0.12);
 }
 
@@ -183,8 +187,8 @@ TEST(GeneratePlume, MovesFromFrameToFrameAsItsVelocitiesSay) {
   // All but those that one frame gives birth to (and as many at the end of their lives).
   EXPECT_GT(shared, 19'700u);
   EXPECT_LT(shared, 20'000u);
-  // The step holds the air's velocity fixed and lets drag act exactly; against the trapezium of the velocities this differs by at
-  // most 0.03 × dt × the slip, which is below twice the greatest speed.
+  // The step holds the air's velocity fixed and lets drag act exactly; against the trapezium of the velocities this
+  // differs by at most 0.03 × dt × the slip, which is below twice the greatest speed.
   EXPECT_LT(worst, 0.06 * dt * fastest);
   EXPECT_GT(fastest, 0.5);
 }
@@ -212,7 +216,8 @@ TEST(PlumeFlow, IsFreeOfDivergence) {
     }
     divergence += sum * sum;
   }
-  // Central differences are wrong by h²/6 of the third derivative: (h/R)² ≈ 1 % of the gradient at the smallest vortices.
+  // Central differences are wrong by h²/6 of the third derivative: (h/R)² ≈ 1 % of the gradient at the smallest
+  // vortices.
   EXPECT_LT(std::sqrt(divergence / gradient), 0.02);
   EXPECT_GT(std::sqrt(gradient / 4000), 1);  // there is something to be free of
 }

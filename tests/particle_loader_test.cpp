@@ -1,5 +1,5 @@
-// Sources into one particle set: files and frames found, channels mapped, radii chosen, moved, merged, and refused with the
-// particle's index.
+// Sources into one particle set: files and frames found, channels mapped, radii chosen, moved, merged, and refused with
+// the particle's index.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -27,7 +27,8 @@ void expectRefused(const std::function<void()>& action, const std::vector<std::s
     ADD_FAILURE() << "nothing was thrown; expected a message with '" << words[0] << "'";
   } catch (const InputError& error) {
     for (const std::string& word : words)
-      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << "'" << word << "' is not in: " << error.what();
+      EXPECT_NE(std::string(error.what()).find(word), std::string::npos)
+          << "'" << word << "' is not in: " << error.what();
   }
 }
 
@@ -40,13 +41,15 @@ ParticleSource fileSource(const std::string& path) {
 
 /// Three particles with every channel.
 struct Sample {
-  std::vector<vec3> position{{1, 0, 0}, {0, 2, 0}, {0, 0, 3}}, color{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, velocity{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  std::vector<vec3> position{{1, 0, 0}, {0, 2, 0}, {0, 0, 3}}, color{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+      velocity{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   std::vector<float> radius{0.1f, 0.2f, 0.3f}, density{1, 2, 0};
   std::vector<std::uint64_t> id{7, 5, 3};
 
   void write(const std::string& path) const {
-    const PrtColumn columns[] = {PrtColumn::of("Position", position), PrtColumn::of("Color", color), PrtColumn::of("Velocity", velocity),
-                                 PrtColumn::of("Radius", radius), PrtColumn::of("Density", density), PrtColumn::of("ID", id)};
+    const PrtColumn columns[] = {PrtColumn::of("Position", position), PrtColumn::of("Color", color),
+                                 PrtColumn::of("Velocity", velocity), PrtColumn::of("Radius", radius),
+                                 PrtColumn::of("Density", density),   PrtColumn::of("ID", id)};
     writePrt(path, columns);
   }
   void writePositions(const std::string& path) const {
@@ -89,14 +92,16 @@ TEST(ParticleLoader, FillsWhatAFileLacks) {
 TEST(ParticleLoader, MapsChannelsByTheNamesOfTheScene) {
   const TempFolder folder;
   const Sample sample;
-  const PrtColumn columns[] = {PrtColumn::of("Position", sample.position), PrtColumn::of("rho", sample.density), PrtColumn::of("pscale", sample.radius)};
+  const PrtColumn columns[] = {PrtColumn::of("Position", sample.position), PrtColumn::of("rho", sample.density),
+                               PrtColumn::of("pscale", sample.radius)};
   writePrt(folder.file("a.prt"), columns);
   // Our writer insists on a Position; other programs' files may call it otherwise.
   std::string bytes = test::readBytes(folder.file("a.prt"));
   bytes.replace(bytes.find("Position"), 8, std::string("P\0\0\0\0\0\0\0", 8));
   test::writeBytes(folder.file("a.prt"), bytes);
   ParticleSource source = fileSource(folder.file("a.prt"));
-  expectRefused([&] { loadParticles({source}, 1); }, {"'Position'", "it has P (3 × float32), rho (float32), pscale (float32)"});
+  expectRefused([&] { loadParticles({source}, 1); },
+                {"'Position'", "it has P (3 × float32), rho (float32), pscale (float32)"});
   source.channels = {{"Position", "P"}, {"Density", "rho"}, {"Radius", "pscale"}};
   ParticleSet set = loadParticles({source}, 1);
   EXPECT_EQ(set.density, sample.density);
@@ -199,7 +204,8 @@ TEST(ParticleLoader, FindsFramesAndSaysWhichExist) {
   EXPECT_EQ(loadParticles({source}, 7, DensityMode::CrossSection, &opened).size(), 3u);
   EXPECT_EQ(opened, std::vector<std::string>{folder.file("p.0007.prt")});
   expectRefused([&] { loadParticles({source}, 3); }, {"p.0003.prt", "no such file", "3 frames from 1 to 7"});
-  expectRefused([&] { loadParticles({fileSource(folder.file("q.0001.prt"))}, 1); }, {"q.0001.prt", "nearest names", "'p.0001.prt'"});
+  expectRefused([&] { loadParticles({fileSource(folder.file("q.0001.prt"))}, 1); },
+                {"q.0001.prt", "nearest names", "'p.0001.prt'"});
   expectRefused([&] { loadParticles({fileSource(folder.file("no/q.prt"))}, 1); }, {"/no' does not exist"});
 }
 
@@ -227,7 +233,8 @@ TEST(ParticleLoader, RefusesDoublePositionsBeyondFloat) {
   const TempFolder folder;
   std::vector<double> doubles{1, 2, 3, 4, 1e300, 6};
   std::vector<vec3> dummy(2);
-  const PrtColumn columns[] = {PrtColumn::raw("P64", PrtType::F64, 3, std::as_bytes(std::span(doubles))), PrtColumn::of("Position", dummy)};
+  const PrtColumn columns[] = {PrtColumn::raw("P64", PrtType::F64, 3, std::as_bytes(std::span(doubles))),
+                               PrtColumn::of("Position", dummy)};
   writePrt(folder.file("a.prt"), columns);
   ParticleSource source = fileSource(folder.file("a.prt"));
   source.channels["Position"] = "P64";
@@ -292,7 +299,8 @@ std::vector<vec3> jitteredGrid(int side) {
   std::vector<vec3> positions;
   Random random(11);
   for (int i = 0; i < side * side * side; ++i)
-    positions.push_back(vec3(i % side + random.uniform(), i / side % side + random.uniform(), i / (side * side) + random.uniform()));
+    positions.push_back(
+        vec3(i % side + random.uniform(), i / side % side + random.uniform(), i / (side * side) + random.uniform()));
   return positions;
 }
 
@@ -308,7 +316,8 @@ TEST(Spacing, AgreesWithBruteForceOnAJitteredGrid) {
 TEST(Spacing, AgreesWithBruteForceOnClustersOutliersAndDuplicates) {
   Random random(5);
   std::vector<vec3> positions;
-  for (int i = 0; i < 1500; ++i) positions.push_back(vec3(1000, 2, 3) + vec3(1e-2 * random.uniform() * random.direction()));
+  for (int i = 0; i < 1500; ++i)
+    positions.push_back(vec3(1000, 2, 3) + vec3(1e-2 * random.uniform() * random.direction()));
   for (int i = 0; i < 700; ++i) positions.push_back(vec3(random.direction()));
   for (int i = 0; i < 800; ++i) positions.push_back(vec3(0.5f));
   for (int i = 0; i < 300; ++i) positions.push_back(vec3(i, 0, 0));  // a line: one axis only
@@ -340,8 +349,8 @@ TEST(Spacing, SampleIsCloseToAllAndTheSameForAnyNumberOfThreads) {
 TEST(Spacing, PoissonFormulaFitsUniformParticles) {
   const ParticleSet ball = generateParticles(Generator::Ball, 200'000, 1, 1);
   const double formula = poissonNeighbourDistance(200'000 / (4.0 / 3 * kPi));
-  // Sampling 0.3 % (18 % spread over 4096); at the surface neighbours lie on one side only: within one spacing (0.026, 8 % of
-  // the particles) the distances grow by up to a quarter, together at most 2 %.
+  // Sampling 0.3 % (18 % spread over 4096); at the surface neighbours lie on one side only: within one spacing (0.026,
+  // 8 % of the particles) the distances grow by up to a quarter, together at most 2 %.
   EXPECT_NEAR(meanNeighbourDistance(ball.position) / formula, 1.01, 0.015);
 }
 

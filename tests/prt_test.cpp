@@ -1,5 +1,5 @@
-// PRT 1.x: what the reader accepts and refuses, and what the writer gives back. Files are put together here byte by byte, so
-// that reader and writer are not only held against each other.
+// PRT 1.x: what the reader accepts and refuses, and what the writer gives back. Files are put together here byte by
+// byte, so that reader and writer are not only held against each other.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <zlib.h>
@@ -7,8 +7,8 @@
 #include <Imath/half.h>
 
 #include <chrono>
-#include <csignal>
 #include <cmath>
+#include <csignal>
 #include <cstring>
 #include <functional>
 #include <limits>
@@ -41,7 +41,9 @@ std::string zeroTerminated(const std::string& text) { return text + '\0'; }
 std::string deflated(const std::string& bytes) {
   uLongf size = compressBound(bytes.size());
   std::string out(size, '\0');
-  EXPECT_EQ(compress2(reinterpret_cast<Bytef*>(out.data()), &size, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size(), 6), Z_OK);
+  EXPECT_EQ(compress2(reinterpret_cast<Bytef*>(out.data()), &size, reinterpret_cast<const Bytef*>(bytes.data()),
+                      bytes.size(), 6),
+            Z_OK);
   out.resize(size);
   return out;
 }
@@ -70,8 +72,8 @@ struct PrtFile {
   std::int32_t reserved = 4, recordLength = 44;
   std::optional<std::int32_t> channelCount;
   std::vector<ChannelRecord> channels{{"Position", 4, 3, 0}, {"Density", 4, 1, 12}};
-  std::string particles;                 ///< not compressed
-  std::optional<std::string> body;       ///< instead of the compressed particles
+  std::string particles;            ///< not compressed
+  std::optional<std::string> body;  ///< instead of the compressed particles
 
   PrtFile() {
     for (int i = 0; i < 3; ++i)
@@ -109,7 +111,8 @@ void expectRefused(const std::function<void()>& action, const std::vector<std::s
     ADD_FAILURE() << "nothing was thrown; expected a message with '" << (words.empty() ? "" : words[0]) << "'";
   } catch (const InputError& error) {
     for (const std::string& word : words)
-      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << "'" << word << "' is not in: " << error.what();
+      EXPECT_NE(std::string(error.what()).find(word), std::string::npos)
+          << "'" << word << "' is not in: " << error.what();
   }
 }
 
@@ -169,7 +172,8 @@ TEST(PrtReader, RefusesTheThreeMalformedFilesOfItsMakersAtOnce) {
   const auto start = std::chrono::steady_clock::now();
   for (const char* name : {"massive_chunk_divisible", "massive_chunk_indivisible", "negative_eight"})
     expectRefused([&] { PrtReader(sharedFile(std::string("prt/") + name + ".prt")); }, {"'Metb'", "length"});
-  // They once made readers loop for ever; two seconds are a thousand times what three headers need, on a busy machine too.
+  // They once made readers loop for ever; two seconds are a thousand times what three headers need, on a busy machine
+  // too.
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(2));
 }
 
@@ -178,7 +182,8 @@ TEST(PrtReader, ReadsTheMakersOwnFileWithItsMetadata) {
   EXPECT_EQ(reader.count(), 312u);
   EXPECT_EQ(reader.header().minorVersion, 1);
   EXPECT_EQ(reader.header().particleBytes, 40u);
-  EXPECT_EQ(reader.header().describeChannels(), "Position (3 × float32), Color (3 × float32), Velocity (3 × float32), Density (float32)");
+  EXPECT_EQ(reader.header().describeChannels(),
+            "Position (3 × float32), Color (3 × float32), Velocity (3 × float32), Density (float32)");
   ASSERT_EQ(reader.header().metadata.size(), 5u);
   ASSERT_NE(reader.header().meta("", "LengthUnitInMeters"), nullptr);
   EXPECT_EQ(reader.header().meta("", "LengthUnitInMeters")->bytes, raw(0.01));
@@ -316,15 +321,16 @@ TEST(PrtReader, AcceptsChannelsInAnyOrderWithGaps) {
   PrtFile file;
   file.channels = {{"Density", 4, 1, 20}, {"Position", 4, 3, 4}};
   file.count = 2;
-  file.particles = "gap!" + raw(1.0f) + raw(2.0f) + raw(3.0f) + "gap!" + raw(4.0f) + "gap!" + raw(5.0f) + raw(6.0f) + raw(7.0f) +
-                   "gap!" + raw(8.0f);
+  file.particles = "gap!" + raw(1.0f) + raw(2.0f) + raw(3.0f) + "gap!" + raw(4.0f) + "gap!" + raw(5.0f) + raw(6.0f) +
+                   raw(7.0f) + "gap!" + raw(8.0f);
   EXPECT_EQ(positionsOf(file.bytes()), (std::vector<vec3>{{1, 2, 3}, {5, 6, 7}}));
 }
 
 TEST(PrtReader, KeepsTextAndSequoiasDottedMetadata) {
   PrtFile file;
-  file.chunks = meta("", "Author", -1, zeroTerminated("J. Doe")) + meta("", "Position.Interpretation", 1, raw(std::int32_t{1})) +
-                chunk("Xtra", std::string(100, '?')) + chunk("Stop", "");
+  file.chunks = meta("", "Author", -1, zeroTerminated("J. Doe")) +
+                meta("", "Position.Interpretation", 1, raw(std::int32_t{1})) + chunk("Xtra", std::string(100, '?')) +
+                chunk("Stop", "");
   const TempFolder folder;
   writeBytes(folder.file("a.prt"), file.bytes());
   const PrtReader reader(folder.file("a.prt"));
@@ -361,7 +367,8 @@ TEST(PrtReader, RefusesBadMetadata) {
   expectRefused(with(meta("", "", 1, raw(1)) + stop), {"a name"});
   expectRefused(with(chunk("Meta", std::string(40, 'x')) + stop), {"at most 31 characters"});
   expectRefused(with(chunk("Meta", zeroTerminated("") + zeroTerminated("A") + "12") + stop), {"4 bytes", "2 bytes"});
-  expectRefused(with(meta("Density", "Interpretation", 1, raw(std::int32_t{4})) + stop), {"Density.Interpretation", "arity 4"});
+  expectRefused(with(meta("Density", "Interpretation", 1, raw(std::int32_t{4})) + stop),
+                {"Density.Interpretation", "arity 4"});
 }
 
 TEST(PrtReader, ReportsDamagedData) {
@@ -469,9 +476,12 @@ TEST(PrtRoundTrip, KeepsMetadataThroughWriterReaderWriter) {
   const std::vector<vec3> positions{{1, 2, 3}, {-1, 5, 2}};
   const std::vector<float> density{1, 2};
   const PrtColumn columns[] = {PrtColumn::of("Position", positions), PrtColumn::of("Density", density)};
-  const std::vector<PrtMetadata> metadata{PrtMetadata::float64("", "LengthUnitInMeters", 0.01), PrtMetadata::int32("", "CoordSys", 1),
-                                          PrtMetadata::text("", "Author", "Jürgen"), PrtMetadata::int32("Position", "Interpretation", 1),
-                                          PrtMetadata::float32s("Density", "Extents", {1, 2}), PrtMetadata::text("Gone", "Note", "x")};
+  const std::vector<PrtMetadata> metadata{PrtMetadata::float64("", "LengthUnitInMeters", 0.01),
+                                          PrtMetadata::int32("", "CoordSys", 1),
+                                          PrtMetadata::text("", "Author", "Jürgen"),
+                                          PrtMetadata::int32("Position", "Interpretation", 1),
+                                          PrtMetadata::float32s("Density", "Extents", {1, 2}),
+                                          PrtMetadata::text("Gone", "Note", "x")};
   writePrt(folder.file("a.prt"), columns, metadata);
   const PrtReader first(folder.file("a.prt"));
   EXPECT_EQ(first.header().metadata.size(), metadata.size());  // BoundBox came, Gone went
@@ -490,7 +500,8 @@ TEST(PrtRoundTrip, KeepsMetadataThroughWriterReaderWriter) {
 TEST(PrtWriter, WritesOneValidZlibStreamForAnyNumberOfThreads) {
   const TempFolder folder;
   std::vector<vec3> positions(400'000);  // 4.8 MB: five pieces
-  for (std::size_t i = 0; i < positions.size(); ++i) positions[i] = vec3(std::sin(0.1f * static_cast<float>(i)), i % 17, i);
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    positions[i] = vec3(std::sin(0.1f * static_cast<float>(i)), i % 17, i);
   const PrtColumn column = PrtColumn::of("Position", positions);
   std::vector<std::string> files;
   for (const unsigned threads : {1u, 2u, 3u}) {
@@ -506,7 +517,9 @@ TEST(PrtWriter, WritesOneValidZlibStreamForAnyNumberOfThreads) {
   const std::size_t begin = static_cast<std::size_t>(header) + 12 + 44;
   std::vector<vec3> back(positions.size());
   uLongf size = back.size() * sizeof(vec3);
-  ASSERT_EQ(uncompress(reinterpret_cast<Bytef*>(back.data()), &size, reinterpret_cast<const Bytef*>(files[0].data()) + begin, files[0].size() - begin), Z_OK);
+  ASSERT_EQ(uncompress(reinterpret_cast<Bytef*>(back.data()), &size,
+                       reinterpret_cast<const Bytef*>(files[0].data()) + begin, files[0].size() - begin),
+            Z_OK);
   EXPECT_EQ(size, positions.size() * sizeof(vec3));
   EXPECT_TRUE(back == positions);
 }
@@ -545,6 +558,15 @@ TEST(PrtWriter, LeavesNothingBehindWhenTheDiskIsFull) {
   setrlimit(RLIMIT_FSIZE, &old);
   std::signal(SIGXFSZ, oldHandler);
   EXPECT_NE(message.find("a.prt: writing failed after"), std::string::npos) << message;
+  EXPECT_TRUE(folder.entries().empty());
+}
+
+TEST(PrtWriter, RefusesNamesThatPrtCannotHold) {
+  const std::vector<vec3> positions{{1, 2, 3}};
+  const TempFolder folder;
+  const std::string longName = "Transmittance_" + std::string(18, 'x');  // 32 characters
+  const PrtColumn columns[] = {PrtColumn::of("Position", positions), PrtColumn::of(longName, positions)};
+  expectRefused([&] { writePrt(folder.file("a.prt"), columns); }, {longName, "channel name"});
   EXPECT_TRUE(folder.entries().empty());
 }
 

@@ -231,6 +231,18 @@ Verdict parse(const json& scene) {
   }
 }
 
+/// The words that the parser says it expects at `pointer`: those of its enumerations.
+std::vector<std::string> expectedWords(json scene, const std::string& pointer) {
+  scene[Pointer(pointer)] = "no_such_word";
+  const std::string message = parse(scene).message;
+  const std::string expected = message.substr(0, message.rfind(", got "));
+  const std::regex quoted("\"([a-zA-Z_]+)\"");
+  std::vector<std::string> words;
+  for (std::sregex_iterator match(expected.begin(), expected.end(), quoted), end; match != end; ++match)
+    words.push_back((*match)[1]);
+  return words;
+}
+
 /// Walks every object of the schema; `visit(property, pointer, base)` gets a scene in which all but the key is there.
 class Walk {
  public:
@@ -282,7 +294,9 @@ TEST(SceneSchema, AcceptsAndRefusesAtEveryKeyWhatTheParserDoes) {
   std::size_t accepted = 0, refused = 0;
   Walk([&](const json& property, const std::string& pointer, const json& base) {
     json companions = kCompanions.contains(pointer) ? kCompanions.at(pointer) : json::object();
-    for (const json& value : candidates(property)) {
+    std::vector<json> values = candidates(property);
+    for (const std::string& word : expectedWords(base, pointer)) values.push_back(word);
+    for (const json& value : values) {
       json scene = base;
       for (const auto& [key, companion] : companions.items())
         scene[Pointer(pointer).parent_pointer() / key] = companion;

@@ -66,6 +66,7 @@ std::vector<float> LightPass::opticalDepths(const layout::Light& light, float cu
   if (count == 0 || light.castsShadows == 0 || light.shadowDensity == 0) return std::vector<float>(count, 0.0f);
   const Buffer order = device_.createBufferWith<std::uint32_t>(rayOrder(*tree_, light));
   const Buffer depths = device_.createBuffer(count * sizeof(float));
+  deviceBytes_ = nodes_.size() + particles_.size() + peaks_.size() + order.size() + depths.size();
   layout::LightParams params{};
   params.nodes = nodes_.address();
   params.particles = particles_.address();

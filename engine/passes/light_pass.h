@@ -25,6 +25,8 @@ class LightPass {
 
   /// Device seconds of all opticalDepths calls so far, from timestamps.
   double deviceSeconds() const { return deviceSeconds_; }
+  /// Bytes on the device while a light is computed.
+  std::uint64_t deviceBytes() const { return deviceBytes_; }
 
  private:
   void createPipeline(bool exact);
@@ -38,6 +40,7 @@ class LightPass {
   const Octree* tree_ = nullptr;
   Buffer nodes_, particles_, peaks_;
   double deviceSeconds_ = 0;
+  std::uint64_t deviceBytes_ = 0;
 };
 
 }  // namespace mote

@@ -51,6 +51,18 @@ bool validationLayerInstalled() {
   return false;
 }
 
+#if defined(__SANITIZE_ADDRESS__)
+// With its last instance the loader unloads drivers and layers, and what those keep in static variables then looks
+// leaked. An instance that is never destroyed keeps them loaded, in builds with the leak checker only.
+void keepLibrariesLoaded(VkInstanceCreateInfo info) {
+  static VkInstance kept = VK_NULL_HANDLE;
+  info.pNext = nullptr;
+  if (kept == VK_NULL_HANDLE) vkCreateInstance(&info, nullptr, &kept);
+}
+#else
+void keepLibrariesLoaded(const VkInstanceCreateInfo&) {}
+#endif
+
 }  // namespace
 
 void MessageLog::add(std::string message) {
@@ -92,6 +104,7 @@ Instance::Instance(bool validate) {
   const VkResult result = vkCreateInstance(&info, nullptr, &instance_);
   if (result == VK_ERROR_INCOMPATIBLE_DRIVER) throw MachineError(fmt::format("no Vulkan device; {}", kWithoutVulkan));
   vkCheck(result, "vkCreateInstance");
+  keepLibrariesLoaded(info);
   volkLoadInstance(instance_);
   if (!validate) return;
   // Not volk's pointers: those become null as soon as an instance without the extension is loaded.

@@ -6,14 +6,45 @@
 
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <mutex>
+#include <set>
+#include <system_error>
+#include <thread>
 
 #include "host/core/error.h"
 
 namespace mote {
 namespace fs = std::filesystem;
+namespace {
+
+/// Temporaries that exist now. Files are made, renamed and removed under the mutex, and whoever ends the process never
+/// lets it go again: nothing can appear behind its back.
+struct LivingTemporaries {
+  std::mutex mutex;
+  std::set<std::string> paths;
+};
+
+LivingTemporaries& livingTemporaries() {
+  static auto* const living = new LivingTemporaries;  // never destroyed: a signal may come while the process ends
+  return *living;
+}
+
+/// Takes one signal of the set and ends the process.
+[[noreturn]] void endOnSignal(sigset_t signals, int exitCode) {
+  int signal = 0;
+  while (sigwait(&signals, &signal) != 0) {
+  }
+  LivingTemporaries& living = livingTemporaries();
+  living.mutex.lock();
+  for (const std::string& path : living.paths) ::unlink(path.c_str());
+  ::_exit(exitCode);  // no destructors: other threads are in the middle of their work
+}
+
+}  // namespace
 
 OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
   const fs::path target(path_);
@@ -31,13 +62,24 @@ OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
                                      target.extension().string()))
                    .string();
   // Created here, so that a folder without write permission is reported before any work is done.
+  LivingTemporaries& living = livingTemporaries();
+  const std::scoped_lock lock(living.mutex);
+  const auto listed = living.paths.insert(temporary_).first;
   const int handle = ::open(temporary_.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0666);
-  if (handle < 0) throw InputError(fmt::format("{}: cannot write there: {}", path_, std::strerror(errno)));
+  if (handle < 0) {
+    const int why = errno;
+    living.paths.erase(listed);
+    throw InputError(fmt::format("{}: cannot write there: {}", path_, std::strerror(why)));
+  }
   ::close(handle);
 }
 
 OutputFile::~OutputFile() {
-  if (!committed_) ::unlink(temporary_.c_str());
+  if (committed_) return;
+  LivingTemporaries& living = livingTemporaries();
+  const std::scoped_lock lock(living.mutex);
+  ::unlink(temporary_.c_str());
+  living.paths.erase(temporary_);
 }
 
 void OutputFile::commit() {
@@ -49,8 +91,11 @@ void OutputFile::commit() {
   // Pipes and some network disks cannot sync; that is no lost data.
   if (synced != 0 && why != EINVAL && why != EROFS)
     throw MachineError(fmt::format("{}: writing failed: {}", path_, std::strerror(why)));
+  LivingTemporaries& living = livingTemporaries();
+  const std::scoped_lock lock(living.mutex);
   if (::rename(temporary_.c_str(), path_.c_str()) != 0)
     throw MachineError(fmt::format("{}: cannot rename '{}' to it: {}", path_, temporary_, std::strerror(errno)));
+  living.paths.erase(temporary_);
   committed_ = true;
 }
 
@@ -63,6 +108,23 @@ void writeWholeFile(const std::string& path, const std::string& bytes) {
   if (!written || !closed)
     throw MachineError(fmt::format("{}: writing {} bytes failed: {}", path, bytes.size(), std::strerror(errno)));
   file.commit();
+}
+
+void removeTemporaryFilesOnSignal(int exitCode) {
+  // sigwait on a thread of its own, and not a handler: removing files needs locks, which handlers must not take.
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction action {};
+    if (sigaction(signal, nullptr, &action) == 0 && action.sa_handler != SIG_IGN) sigaddset(&signals, signal);
+  }
+  livingTemporaries();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  try {
+    std::thread(endOnSignal, signals, exitCode).detach();
+  } catch (const std::system_error& e) {
+    throw MachineError(fmt::format("cannot start the thread that waits for signals: {}", e.what()));
+  }
 }
 
 }  // namespace mote

@@ -13,11 +13,14 @@ namespace mote {
 constexpr double kGeneratorFps = 24;
 
 /// `count` ≥ 1 particles with position, radius, density (cross-section) and id; the plume has velocity too.
-///   Ball   uniform in the unit ball about the origin; equal cross-sections 8π/(3N), so that the mean optical depth along
-///          a diameter is 4; radius 1.5 × the mean distance to the nearest 8 of a Poisson process of that density. `frame` is unused.
+///   Ball   uniform in the unit ball about the origin; equal cross-sections 8π/(3N), so that the mean optical depth
+///   along
+///          a diameter is 4; radius 1.5 × the mean distance to the nearest 8 of a Poisson process of that density.
+///          `frame` is unused.
 ///   Cloud  distributed after fractal noise inside [-1, 1]³, y up; see generate_cloud.cpp. `frame` is unused.
 ///   Plume  smoke rising from the origin to about y = 2 at time (frame − 1)/24 s; see generate_plume.cpp.
-/// Throws InputError for a count of 0. Cost on 2 cores: see the generators' files.
+/// Throws InputError for a count of 0. Core-seconds, shared by the threads: 1 M ball 0.1, 1 M cloud 1.4, 350 k
+/// plume 3.6.
 ParticleSet generateParticles(Generator kind, std::uint64_t count, std::uint64_t seed, int frame);
 
 ParticleSet generateBall(std::uint64_t count, std::uint64_t seed);

@@ -56,9 +56,10 @@ class CloudShape {
 /// Cells of [-1, 1]³ with an estimate of the greatest density in each, and their running sum to draw cells from.
 class CellTable {
  public:
-  static constexpr int kCells = 80;
+  static constexpr int kCells = 64;
 
-  explicit CellTable(const CloudShape& shape) : most_(kCells * kCells * kCells), sum_(most_.size() + 1, 0), mean_(kCells, 0) {
+  explicit CellTable(const CloudShape& shape)
+      : most_(kCells * kCells * kCells), sum_(most_.size() + 1, 0), mean_(kCells, 0) {
     parallelBlocks(kCells, 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t z = begin; z < end; ++z) fillSlice(shape, static_cast<int>(z));
     });
@@ -90,7 +91,8 @@ class CellTable {
         const vec3 lo = vec3(x, y, z) * kSize - 1.0f;
         float most = 0;
         for (int k = 0; k < 9; ++k) {  // centre, then the points half-way to the corners
-          const vec3 offset = k == 0 ? vec3(0.5f) : vec3(k & 1 ? 0.75f : 0.25f, k & 2 ? 0.75f : 0.25f, k & 4 ? 0.75f : 0.25f);
+          const vec3 offset =
+              k == 0 ? vec3(0.5f) : vec3(k & 1 ? 0.75f : 0.25f, k & 2 ? 0.75f : 0.25f, k & 4 ? 0.75f : 0.25f);
           const float d = shape.density(lo + offset * kSize);
           most = std::max(most, d);
           sum += static_cast<double>(d) / 9;
@@ -98,7 +100,8 @@ class CellTable {
         // The density moves by less than this within a quarter of a cell; what exceeds it all the same is cut, unseen.
         most_[(static_cast<std::size_t>(z) * kCells + y) * kCells + x] = most > 0 ? std::min(1.0f, most + 0.3f) : 0;
       }
-    mean_[static_cast<std::size_t>(z)] = sum * static_cast<double>(kSize) * static_cast<double>(kSize) * static_cast<double>(kSize);
+    mean_[static_cast<std::size_t>(z)] =
+        sum * static_cast<double>(kSize) * static_cast<double>(kSize) * static_cast<double>(kSize);
   }
 
   std::vector<float> most_;

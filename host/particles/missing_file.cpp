@@ -35,7 +35,8 @@ std::vector<std::string> fileNames(const fs::path& folder) {
   constexpr std::size_t kEnough = 100'000;  // a message does not need more of a huge folder
   std::vector<std::string> names;
   std::error_code error;
-  for (fs::directory_iterator it(folder, error), end; !error && it != end && names.size() < kEnough; it.increment(error))
+  for (fs::directory_iterator it(folder, error), end; !error && it != end && names.size() < kEnough;
+       it.increment(error))
     if (it->path().filename().string().front() != '.') names.push_back(it->path().filename().string());
   std::sort(names.begin(), names.end());
   return names;
@@ -71,7 +72,8 @@ std::string nearestNames(const std::string& pattern, const std::string& path) {
     const std::vector<int> frames = existingFrames(fs::path(pattern).filename().string(), names);
     if (frames.size() == 1) return fmt::format("of this sequence only frame {} exists", frames[0]);
     if (!frames.empty())
-      return fmt::format("of this sequence {} frames from {} to {} exist", frames.size(), frames.front(), frames.back());
+      return fmt::format("of this sequence {} frames from {} to {} exist", frames.size(), frames.front(),
+                         frames.back());
   }
   const std::string wanted = full.filename().string();
   const std::size_t shown = std::min<std::size_t>(3, names.size());

@@ -4,8 +4,8 @@
 
 namespace mote {
 
-/// A sentence part about what lies in the folder of `path`: which frames of `pattern` exist, else the most similar names,
-/// else that the folder itself is missing. Never throws for what it finds on the disk.
+/// A sentence part about what lies in the folder of `path`: which frames of `pattern` exist, else the most similar
+/// names, else that the folder itself is missing. Never throws for what it finds on the disk.
 std::string nearestNames(const std::string& pattern, const std::string& path);
 
 }  // namespace mote

@@ -62,7 +62,8 @@ bool wanted(const ParticleSource& source, const PrtReader& file, const std::stri
 void requireVector(const PrtReader& file, const std::string& name) {
   const PrtChannel* channel = file.header().channel(name);
   if (channel && channel->arity < 3)
-    throw InputError(file.path(), fmt::format("channel '{}'", name), "arity 3", fmt::format("arity {}", channel->arity));
+    throw InputError(file.path(), fmt::format("channel '{}'", name), "arity 3",
+                     fmt::format("arity {}", channel->arity));
 }
 
 void checkChannelKeys(const ParticleSource& source) {
@@ -116,7 +117,8 @@ Loaded readFile(const ParticleSource& source, const std::string& path) {
     requireVector(file, velocity.theirs);
     requests.push_back({velocity.theirs, &set.velocity});
   }
-  if (const auto name = nameOf(source, "ID"); wanted(source, file, "ID", name)) requests.push_back({name.theirs, &set.id});
+  if (const auto name = nameOf(source, "ID"); wanted(source, file, "ID", name))
+    requests.push_back({name.theirs, &set.id});
   file.read(requests);
   if (set.density.empty()) set.density.assign(set.size(), source.density);
   return loaded;
@@ -154,11 +156,12 @@ std::string text(const vec3& v) { return fmt::format("({}, {}, {})", v.x, v.y, v
 void checkVectors(const Loaded& loaded, const std::vector<vec3>& values, const char* what, const char* when) {
   const std::size_t i = firstWhere(values.size(), [&](std::size_t k) { return !isFinite(values[k]); });
   if (i < values.size())
-    throw InputError(loaded.place, fmt::format("particle {}: {}{}", i, what, when), "numbers that are finite in float32",
-                     text(values[i]));
+    throw InputError(loaded.place, fmt::format("particle {}: {}{}", i, what, when),
+                     "numbers that are finite in float32", text(values[i]));
 }
 
-void checkScalars(const Loaded& loaded, const std::vector<float>& values, const char* what, const char* when, bool zeroAllowed) {
+void checkScalars(const Loaded& loaded, const std::vector<float>& values, const char* what, const char* when,
+                  bool zeroAllowed) {
   const auto bad = [&](std::size_t k) {
     return !std::isfinite(values[k]) || values[k] < 0 || (values[k] == 0 && !zeroAllowed);
   };
@@ -192,7 +195,8 @@ void applyRadiusRule(const ParticleSource& source, Loaded& loaded) {
   const auto radius = static_cast<float>(kAutoRadiusFactor * spacing);
   if (!(radius > 0) || !std::isfinite(radius))
     throw InputError(loaded.place, "", "particles with distances that a radius can be taken from",
-                     set.size() == 1 ? "a single particle" : fmt::format("{} particles with a mean spacing of {}", set.size(), spacing),
+                     set.size() == 1 ? "a single particle"
+                                     : fmt::format("{} particles with a mean spacing of {}", set.size(), spacing),
                      fmt::format("give {} a \"radius\": a number", scenePlace(source)));
   set.radius.assign(set.size(), radius);
 }

@@ -13,7 +13,8 @@ constexpr std::size_t kBlock = 1 << 16;
 template <class Partial, class Body>
 std::vector<Partial> blockResults(std::size_t count, const Body& body) {
   std::vector<Partial> partial((count + kBlock - 1) / kBlock);
-  parallelBlocks(count, kBlock, [&](std::size_t begin, std::size_t end) { partial[begin / kBlock] = body(begin, end); });
+  parallelBlocks(count, kBlock,
+                 [&](std::size_t begin, std::size_t end) { partial[begin / kBlock] = body(begin, end); });
   return partial;
 }
 

@@ -15,9 +15,9 @@ struct TypeFacts {
   std::string_view name;
   std::size_t size;
 };
-constexpr TypeFacts kTypes[kPrtTypes] = {{"int16", 2},  {"int32", 4},  {"int64", 8},  {"float16", 2},
+constexpr TypeFacts kTypes[kPrtTypes] = {{"int16", 2},   {"int32", 4},   {"int64", 8},  {"float16", 2},
                                          {"float32", 4}, {"float64", 8}, {"uint16", 2}, {"uint32", 4},
-                                         {"uint64", 8}, {"int8", 1},   {"uint8", 1}};
+                                         {"uint64", 8},  {"int8", 1},    {"uint8", 1}};
 
 template <class T>
 std::string rawBytes(const T* values, std::size_t count) {

@@ -1,5 +1,6 @@
 // What a PRT 1.0 or 1.1 file says before its particles: types, channels and metadata as plain data.
-// Format: reference "PRT file format" of Krakatoa's makers, as their open code implements it. All numbers little-endian.
+// Format: reference "PRT file format" of Krakatoa's makers, as their open code implements it. All numbers
+// little-endian.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -22,20 +23,20 @@ std::string_view prtTypeName(PrtType type);
 
 /// One array of the particles.
 struct PrtChannel {
-  std::string name;           ///< [A-Za-z_][A-Za-z0-9_]{0,30}
+  std::string name;  ///< [A-Za-z_][A-Za-z0-9_]{0,30}
   PrtType type = PrtType::F32;
-  std::uint32_t arity = 1;    ///< numbers a particle, ≥ 1
-  std::uint32_t offset = 0;   ///< of the first one in the packed particle [bytes]
+  std::uint32_t arity = 1;   ///< numbers a particle, ≥ 1
+  std::uint32_t offset = 0;  ///< of the first one in the packed particle [bytes]
 
   std::size_t bytes() const { return prtTypeSize(type) * arity; }
 };
 
 /// One value of a 1.1 file, raw, so that a writer can give it back unchanged.
 struct PrtMetadata {
-  std::string channel;              ///< empty: of the whole file
-  std::string name;                 ///< 1 to 31 characters
-  std::int32_t type = kPrtText;     ///< a PrtType, or kPrtText
-  std::string bytes;                ///< little-endian numbers; or the text, without a terminating NUL
+  std::string channel;           ///< empty: of the whole file
+  std::string name;              ///< 1 to 31 characters
+  std::int32_t type = kPrtText;  ///< a PrtType, or kPrtText
+  std::string bytes;             ///< little-endian numbers; or the text, without a terminating NUL
 
   static PrtMetadata text(std::string channel, std::string name, std::string text);
   static PrtMetadata int32(std::string channel, std::string name, std::int32_t value);
@@ -45,11 +46,11 @@ struct PrtMetadata {
 
 /// Everything in front of the zlib stream.
 struct PrtHeader {
-  int minorVersion = 1;                ///< 0 or 1: PRT 1.0 or 1.1
-  std::uint64_t count = 0;             ///< particles
-  std::vector<PrtChannel> channels;    ///< in the file's order; no two overlap
-  std::vector<PrtMetadata> metadata;   ///< file and channel values; (channel, name) is unique
-  std::size_t particleBytes = 0;       ///< of one packed particle, gaps included
+  int minorVersion = 1;               ///< 0 or 1: PRT 1.0 or 1.1
+  std::uint64_t count = 0;            ///< particles
+  std::vector<PrtChannel> channels;   ///< in the file's order; no two overlap
+  std::vector<PrtMetadata> metadata;  ///< file and channel values; (channel, name) is unique
+  std::size_t particleBytes = 0;      ///< of one packed particle, gaps included
 
   /// Null where the file has none of that name (names are case-sensitive).
   const PrtChannel* channel(std::string_view name) const;

@@ -18,7 +18,8 @@ constexpr std::uint64_t kMaxParticleBytes = 1 << 20;
 // A value in a message: printable characters only, and not more than a line of them.
 std::string shown(std::string_view raw) {
   std::string text = "'";
-  for (const char c : raw.substr(0, 40)) text += c >= 32 && c < 127 ? std::string(1, c) : fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
+  for (const char c : raw.substr(0, 40))
+    text += c >= 32 && c < 127 ? std::string(1, c) : fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
   return text + (raw.size() > 40 ? "…'" : "'");
 }
 
@@ -148,7 +149,8 @@ struct Parser {
       value.channel = value.name.substr(0, dot);
       value.name.erase(0, dot + 1);
     }
-    const std::string field = fmt::format("metadata {}", value.channel.empty() ? shown(value.name) : shown(value.channel + "." + value.name));
+    const std::string field =
+        fmt::format("metadata {}", value.channel.empty() ? shown(value.name) : shown(value.channel + "." + value.name));
     if (!value.channel.empty() && !prtNameIsValid(value.channel)) fail(field, "a channel's name", shown(value.channel));
     if (value.name.empty()) fail(field, "a name", "an empty one");
     if (rest.size() < 4) fail(field, "a type of 4 bytes", fmt::format("{} bytes", rest.size()));
@@ -211,7 +213,8 @@ struct Parser {
     PrtChannel channel;
     channel.name = name.substr(0, zero);
     if (!prtNameIsValid(channel.name))
-      fail(fmt::format("channel {}: name", index), "a letter or '_', then letters, digits and '_'", shown(channel.name));
+      fail(fmt::format("channel {}: name", index), "a letter or '_', then letters, digits and '_'",
+           shown(channel.name));
     const std::string field = fmt::format("channel '{}'", channel.name);
     if (type < 0 || type >= kPrtTypes) fail(field + ": type", "0 to 10", fmt::format("{}", type));
     if (arity < 1) fail(field + ": arity", "1 or more", fmt::format("{}", arity));
@@ -248,7 +251,8 @@ struct Parser {
       if (m.channel.empty()) continue;
       const PrtChannel* channel = header.channel(m.channel);
       if (!channel)
-        logWarning(fmt::format("{}: dropped metadata '{}' of '{}', a channel that the file does not have", path, m.name, m.channel));
+        logWarning(fmt::format("{}: dropped metadata '{}' of '{}', a channel that the file does not have", path, m.name,
+                               m.channel));
       else if (m.name == "Interpretation")
         checkInterpretation(m, *channel);
     }
@@ -261,7 +265,8 @@ struct Parser {
     std::memcpy(&kind, m.bytes.data(), 4);
     if ((kind == 4 || kind == 5) && channel.arity != 4)
       fail(fmt::format("metadata '{}.Interpretation'", channel.name),
-           fmt::format("arity 4 for {}", kind == 4 ? "an orientation" : "a rotation"), fmt::format("{}", channel.arity));
+           fmt::format("arity 4 for {}", kind == 4 ? "an orientation" : "a rotation"),
+           fmt::format("{}", channel.arity));
   }
 };
 

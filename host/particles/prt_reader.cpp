@@ -20,14 +20,14 @@
 namespace mote {
 namespace {
 
-// Deflate's best case: 258 bytes from one length and one distance code of a bit each, less block headers (zlib.net, "Maximum
-// Compression Factor").
+// Deflate's best case: 258 bytes from one length and one distance code of a bit each, less block headers (zlib.net,
+// "Maximum Compression Factor").
 constexpr std::uint64_t kMaxExpansion = 1032;
 // Large enough to hide a task's start, small enough that the blocks in flight stay in the cache.
 constexpr std::size_t kBlockBytes = 1 << 19;
 constexpr std::size_t kInputBytes = 1 << 17;
-// Memory that is reserved at once: what the file's bytes give at this ratio (particles compress 1 to 4 times). Files that
-// expand further grow their arrays as the data arrive.
+// Memory that is reserved at once: what the file's bytes give at this ratio (particles compress 1 to 4 times). Files
+// that expand further grow their arrays as the data arrive.
 constexpr std::uint64_t kReservedExpansion = 8;
 
 template <class To, class From>
@@ -42,7 +42,8 @@ To converted(From value) {
 
 /// Copies `components` numbers of each of `count` particles; source numbers may stand unaligned.
 template <class From, class To>
-void convertColumn(const std::byte* from, std::size_t stride, std::size_t count, int components, bool broadcast, To* to) {
+void convertColumn(const std::byte* from, std::size_t stride, std::size_t count, int components, bool broadcast,
+                   To* to) {
   for (std::size_t i = 0; i < count; ++i, from += stride)
     for (int c = 0; c < components; ++c) {
       From value;
@@ -52,7 +53,8 @@ void convertColumn(const std::byte* from, std::size_t stride, std::size_t count,
 }
 
 template <class To>
-void convertTyped(PrtType type, const std::byte* from, std::size_t stride, std::size_t count, int components, bool broadcast, To* to) {
+void convertTyped(PrtType type, const std::byte* from, std::size_t stride, std::size_t count, int components,
+                  bool broadcast, To* to) {
   const auto run = [&]<class From>(From) { convertColumn<From>(from, stride, count, components, broadcast, to); };
   switch (type) {
     case PrtType::I16: return run(std::int16_t{});
@@ -155,7 +157,8 @@ class Inflater {
   bool refill() {
     const std::size_t got = std::fread(input_.data(), 1, input_.size(), file_);
     if (got == 0 && std::ferror(file_))
-      throw MachineError(fmt::format("{}: reading failed after {} bytes of particle data: {}", path_, bytesRead_, std::strerror(errno)));
+      throw MachineError(fmt::format("{}: reading failed after {} bytes of particle data: {}", path_, bytesRead_,
+                                     std::strerror(errno)));
     bytesRead_ += got;
     stream_.next_in = input_.data();
     stream_.avail_in = static_cast<uInt>(got);
@@ -192,20 +195,20 @@ struct Block {
 [[noreturn]] void throwTruncated(const PrtReader& reader, const Inflater& stream, std::uint64_t bytesOut) {
   const PrtHeader& header = reader.header();
   const std::string got = stream.ended() ? "the zlib stream ends" : "the file ends";
-  throw InputError(reader.path(), "particle data", fmt::format("{} particles of {} bytes", header.count, header.particleBytes),
-                   fmt::format("{} at particle {} of {}, after {} of {} bytes ({} compressed)", got,
-                               bytesOut / header.particleBytes, header.count, bytesOut,
-                               header.count * header.particleBytes, stream.bytesIn()),
-                   "the file is cut off, or its header promises too many");
+  throw InputError(
+      reader.path(), "particle data", fmt::format("{} particles of {} bytes", header.count, header.particleBytes),
+      fmt::format("{} at particle {} of {}, after {} of {} bytes ({} compressed)", got, bytesOut / header.particleBytes,
+                  header.count, bytesOut, header.count * header.particleBytes, stream.bytesIn()),
+      "the file is cut off, or its header promises too many");
 }
 
 }  // namespace
 
 PrtReader::PrtReader(std::string path) : path_(std::move(path)) {
   struct stat facts {};
-  if (::stat(path_.c_str(), &facts) != 0)
-    throw InputError(path_, "", "a readable file", std::strerror(errno));
-  if (!S_ISREG(facts.st_mode)) throw InputError(path_, "", "a file", S_ISDIR(facts.st_mode) ? "a folder" : "a device or pipe");
+  if (::stat(path_.c_str(), &facts) != 0) throw InputError(path_, "", "a readable file", std::strerror(errno));
+  if (!S_ISREG(facts.st_mode))
+    throw InputError(path_, "", "a file", S_ISDIR(facts.st_mode) ? "a folder" : "a device or pipe");
   file_.reset(std::fopen(path_.c_str(), "rbe"));
   if (!file_) throw InputError(path_, "", "a readable file", std::strerror(errno));
   fileBytes_ = static_cast<std::uint64_t>(facts.st_size);
@@ -216,10 +219,11 @@ PrtReader::PrtReader(std::string path) : path_(std::move(path)) {
   const std::uint64_t left = fileBytes_ - dataBegin_;
   // particleBytes ≥ 1, and left × 1032 stays far below 2^64 for any file that exists; the division cannot overflow.
   if (header_.count > left * kMaxExpansion / header_.particleBytes)
-    throw InputError(path_, "particle count",
-                     fmt::format("at most {}, what {} bytes of zlib data can hold ({} bytes a particle, expansion at most {})",
-                                 left * kMaxExpansion / header_.particleBytes, left, header_.particleBytes, kMaxExpansion),
-                     fmt::format("{}", header_.count), "the file is cut off or its header is damaged");
+    throw InputError(
+        path_, "particle count",
+        fmt::format("at most {}, what {} bytes of zlib data can hold ({} bytes a particle, expansion at most {})",
+                    left * kMaxExpansion / header_.particleBytes, left, header_.particleBytes, kMaxExpansion),
+        fmt::format("{}", header_.count), "the file is cut off or its header is damaged");
 }
 
 void PrtReader::read(std::span<const PrtRequest> requests) const {
@@ -260,7 +264,8 @@ void PrtReader::read(std::span<const PrtRequest> requests) const {
       logWarning(fmt::format("{}: ignored data behind the last of its {} particles", path_, count));
     else if (!stream.ended())
       throw InputError(path_, "particle data", "a zlib stream with its checksum",
-                       fmt::format("the file's end, after particle {} of {} and {} compressed bytes", count, count, stream.bytesIn()),
+                       fmt::format("the file's end, after particle {} of {} and {} compressed bytes", count, count,
+                                   stream.bytesIn()),
                        "the file is cut off");
   } catch (const std::bad_alloc&) {
     throw MachineError(fmt::format("{}: not enough memory for {} particles of {} bytes", path_, count, size));

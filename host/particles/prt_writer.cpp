@@ -52,7 +52,8 @@ void appendMetadata(std::string& out, const PrtMetadata& m) {
 }
 
 const PrtColumn& positionColumn(std::span<const PrtColumn> columns) {
-  const auto found = std::find_if(columns.begin(), columns.end(), [](const PrtColumn& c) { return c.name == "Position"; });
+  const auto found =
+      std::find_if(columns.begin(), columns.end(), [](const PrtColumn& c) { return c.name == "Position"; });
   MOTE_CHECK(found != columns.end(), ==, true);
   MOTE_CHECK(static_cast<int>(found->type), ==, static_cast<int>(PrtType::F32));
   MOTE_CHECK(found->arity, ==, 3u);
@@ -76,12 +77,15 @@ struct Layout {
   std::size_t particleBytes = 0, count = 0;
 };
 
-Layout layoutOf(std::span<const PrtColumn> columns) {
+Layout layoutOf(const std::string& path, std::span<const PrtColumn> columns) {
   Layout layout;
   std::set<std::string> names;
   layout.count = positionColumn(columns).bytes.size() / sizeof(vec3);
   for (const PrtColumn& c : columns) {
-    MOTE_CHECK(prtNameIsValid(c.name), ==, true);
+    // Names may come from a scene (a light's, a mapped channel's), so a bad one is no bug.
+    if (!prtNameIsValid(c.name))
+      throw InputError(path, "channel name", "a letter or '_', then up to 30 letters, digits and '_'",
+                       fmt::format("'{}'", c.name));
     MOTE_CHECK(names.insert(c.name).second, ==, true);
     layout.channels.push_back({c.name, c.type, c.arity, static_cast<std::uint32_t>(layout.particleBytes)});
     MOTE_CHECK(c.bytes.size(), ==, layout.count * layout.channels.back().bytes());
@@ -96,7 +100,8 @@ std::string headerBytes(const Layout& layout, std::span<const PrtColumn> columns
   if (options.minorVersion == 1) {
     appendMetadata(chunks, PrtMetadata::float32s("", "BoundBox", boundBox(positionColumn(columns), layout.count)));
     const auto isWritten = [&](const std::string& name) {
-      return name.empty() || std::any_of(columns.begin(), columns.end(), [&](const PrtColumn& c) { return c.name == name; });
+      return name.empty() ||
+             std::any_of(columns.begin(), columns.end(), [&](const PrtColumn& c) { return c.name == name; });
     };
     for (const PrtMetadata& m : metadata)
       if (isWritten(m.channel) && !(m.channel.empty() && m.name == "BoundBox")) appendMetadata(chunks, m);
@@ -128,7 +133,8 @@ struct Piece {
   std::size_t rawBytes = 0;
 };
 
-std::vector<std::byte> interleave(const Layout& layout, std::span<const PrtColumn> columns, std::size_t begin, std::size_t end) {
+std::vector<std::byte> interleave(const Layout& layout, std::span<const PrtColumn> columns, std::size_t begin,
+                                  std::size_t end) {
   std::vector<std::byte> packed((end - begin) * layout.particleBytes);
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const std::size_t bytes = layout.channels[k].bytes();
@@ -208,9 +214,10 @@ void writeParticles(Sink& sink, const Layout& layout, std::span<const PrtColumn>
   };
   using tbb::filter_mode;
   using Shared = std::shared_ptr<Piece>;
-  tbb::parallel_pipeline(2 * threadCount() + 2, tbb::make_filter<void, Shared>(filter_mode::serial_in_order, begin) &
-                                                    tbb::make_filter<Shared, Shared>(filter_mode::parallel, compress) &
-                                                    tbb::make_filter<Shared, void>(filter_mode::serial_in_order, write));
+  tbb::parallel_pipeline(2 * threadCount() + 2,
+                         tbb::make_filter<void, Shared>(filter_mode::serial_in_order, begin) &
+                             tbb::make_filter<Shared, Shared>(filter_mode::parallel, compress) &
+                             tbb::make_filter<Shared, void>(filter_mode::serial_in_order, write));
   const char checksum[4] = {static_cast<char>(adler >> 24), static_cast<char>(adler >> 16),
                             static_cast<char>(adler >> 8), static_cast<char>(adler)};
   sink.write(std::string_view(checksum, sizeof checksum));
@@ -234,7 +241,7 @@ PrtColumn PrtColumn::raw(std::string name, PrtType type, std::uint32_t arity, st
 void writePrt(const std::string& path, std::span<const PrtColumn> columns, std::span<const PrtMetadata> metadata,
               const PrtWriteOptions& options) {
   MOTE_CHECK(options.minorVersion == 0 || options.minorVersion == 1, ==, true);
-  const Layout layout = layoutOf(columns);
+  const Layout layout = layoutOf(path, columns);
   OutputFile file(path);
   Sink sink(file.temporaryPath(), file.path());
   sink.write(headerBytes(layout, columns, metadata, options));

@@ -27,13 +27,14 @@ struct PrtColumn {
 
 struct PrtWriteOptions {
   int minorVersion = 1;  ///< 1: PRT 1.1; 0: PRT 1.0, which has no metadata (they are left out)
-  int level = 1;         ///< zlib's 0 to 9; measured on 9 M cloud particles (float32): 1 → 88 % at 5× the speed of 6 → 87 %
+  int level = 1;  ///< zlib's 0 to 9; 1 M cloud particles: 1 gives 15.70 MB in 0.44 core-seconds, 6 gives 15.64 in 1.20
 };
 
-/// Writes one PRT file through an OutputFile. There must be a Position of 3 × float32, all columns of the same length and
-/// with different names (checked: these are bugs of the caller). `BoundBox` is always written, from the positions;
+/// Writes one PRT file through an OutputFile. There must be a Position of 3 × float32, all columns of the same length
+/// and with different names (checked: these are bugs of the caller). `BoundBox` is always written, from the positions;
 /// metadata of channels that are not written are left out. The bytes do not depend on the number of threads.
-/// Throws InputError where the path cannot be written, MachineError where the disk refuses; then nothing is left behind.
+/// Throws InputError where the path cannot be written or a channel's name is none for PRT, MachineError where the disk
+/// refuses; then nothing is left behind.
 void writePrt(const std::string& path, std::span<const PrtColumn> columns, std::span<const PrtMetadata> metadata = {},
               const PrtWriteOptions& options = {});
 

@@ -72,7 +72,8 @@ class BucketTree {
     const dvec3 size = dvec3(box.hi) - dvec3(box.lo);
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     const auto middle = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() / 2);
-    std::nth_element(sample.begin(), middle, sample.end(), [axis](const vec3& a, const vec3& b) { return a[axis] < b[axis]; });
+    std::nth_element(sample.begin(), middle, sample.end(),
+                     [axis](const vec3& a, const vec3& b) { return a[axis] < b[axis]; });
     axis_[node] = static_cast<std::uint8_t>(axis);
     plane_[node] = (*middle)[axis];
     split(2 * node, level + 1, {sample.begin(), middle});
@@ -135,7 +136,8 @@ class BucketTree {
 
   void scan(std::size_t bucket, const vec3& query, Nearest& nearest) const {
     const dvec3 q(query);
-    // A bucket of coinciding particles may be as large as the set: once all neighbours are at distance 0 none is nearer.
+    // A bucket of coinciding particles may be as large as the set: once all neighbours are at distance 0 none is
+    // nearer.
     for (std::size_t i = begin_[bucket]; i < begin_[bucket + 1] && nearest.worst() > 0; ++i) {
       const dvec3 d = dvec3(points_[i]) - q;
       const double squared = glm::dot(d, d);
@@ -144,11 +146,11 @@ class BucketTree {
   }
 
   int depth_ = 0;
-  std::vector<std::uint8_t> axis_;   // by node, the root is 1, children 2n and 2n+1
+  std::vector<std::uint8_t> axis_;  // by node, the root is 1, children 2n and 2n+1
   std::vector<float> plane_;
-  std::vector<Bounds> box_;          // by node, tight
-  std::vector<std::size_t> begin_;   // by bucket
-  std::vector<vec3> points_;         // in bucket order
+  std::vector<Bounds> box_;         // by node, tight
+  std::vector<std::size_t> begin_;  // by bucket
+  std::vector<vec3> points_;        // in bucket order
 };
 
 }  // namespace

@@ -85,6 +85,7 @@ void fitDefaults(Scene& scene, const Bounds& supportBounds) {
   MOTE_CHECK(std::isfinite(box.radius), ==, true);
   if (scene.camera.fitted) fitCamera(scene.camera, scene.output.size, box);
   if (scene.defaultLights) scene.lights = {keyLight(scene.camera, box)};
+  scene.camera.fitted = scene.camera.fittedDepths = scene.defaultLights = false;
 }
 
 }  // namespace mote

@@ -5,8 +5,9 @@
 
 namespace mote {
 
-/// Fills in what `scene` marks as fitted; calls after the first change nothing. `supportBounds`: of the particles'
-/// supports, finite, not empty (MOTE_CHECK).
+/// Fills in what `scene` marks as fitted and takes the marks away: calls after the first change nothing, so one Scene
+/// kept over a sequence keeps the camera of its first frame. `supportBounds`: of the particles' supports, finite, not
+/// empty (MOTE_CHECK).
 ///  * camera.fitted: position and target so that the whole box is in the picture, with a margin of 5 % at each side, at
 ///    the scene's fov, up and output size, from slightly above; fittedDepths: near and far around the box.
 ///  * defaultLights: a point light "key" behind the box, to the upper left as the camera sees it. Its intensity makes a

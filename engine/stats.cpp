@@ -1,0 +1,62 @@
+#include "engine/stats.h"
+
+#include <sys/resource.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace mote {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json reproducible(const FrameStats& frame) {
+  Json inputs = Json::array();
+  for (const FrameInput& input : frame.inputs) inputs.push_back({{"file", input.file}, {"sha256", input.sha256}});
+  return {{"frame", frame.frame},
+          {"particles", frame.particles},
+          {"in_octree", frame.inOctree},
+          {"lights", frame.lights},
+          {"density_scale", frame.densityScale},
+          {"radius", {{"min", frame.radius.min}, {"mean", frame.radius.mean}, {"max", frame.radius.max}}},
+          {"inputs", std::move(inputs)},
+          {"warnings", frame.warnings}};
+}
+
+Json rounded(const std::map<std::string, double>& seconds) {
+  Json object = Json::object();
+  for (const auto& [stage, value] : seconds) object[stage] = std::round(value * 1e6) / 1e6;
+  return object;
+}
+
+}  // namespace
+
+std::uint64_t peakResidentBytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+std::string statsJson(const RunStats& run) {
+  Json frames = Json::array();
+  for (const FrameStats& frame : run.frames) {
+    Json entry = reproducible(frame);
+    entry["seconds"] = rounded(frame.seconds);
+    entry["device_seconds"] = rounded(frame.deviceSeconds);
+    entry["bytes"] = {{"peak_rss", peakResidentBytes()}, {"device", frame.deviceBytes}};
+    frames.push_back(std::move(entry));
+  }
+  const Json root = {{"version", MOTE_VERSION}, {"device", run.device},   {"lighting", run.lighting},
+                     {"raster", run.raster},    {"threads", run.threads}, {"frames", std::move(frames)}};
+  return root.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string reproducibleStatsJson(const RunStats& run, const FrameStats& frame) {
+  Json root = reproducible(frame);
+  root["version"] = MOTE_VERSION;
+  root["lighting"] = run.lighting;
+  root["raster"] = run.raster;
+  return root.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace mote

@@ -1,0 +1,45 @@
+// What a frame was made from and what it cost: `--stats`, reports and EXR headers (SCENE.md).
+#pragma once
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "host/particles/particle_set.h"
+
+namespace mote {
+
+struct FrameInput {
+  std::string file, sha256;
+};
+
+struct FrameStats {
+  int frame = 1;
+  std::size_t particles = 0, inOctree = 0, lights = 0;
+  std::map<std::string, double> seconds;        ///< wall clock: load, octree, lighting, sort, splat, write, total
+  std::map<std::string, double> deviceSeconds;  ///< the GPU's own clock (timestamps): lighting, sort, splat
+  std::uint64_t deviceBytes = 0;                ///< most device memory held at once by one stage
+  double densityScale = 1;
+  RadiusRange radius;
+  std::vector<FrameInput> inputs;
+  std::vector<std::string> warnings;
+};
+
+struct RunStats {
+  std::string device = "none";   ///< Vulkan device in use
+  std::string lighting, raster;  ///< "cpu" or "gpu"
+  unsigned threads = 0;
+  std::vector<FrameStats> frames;
+};
+
+/// Most memory this process ever held [bytes].
+std::uint64_t peakResidentBytes();
+
+/// The whole run as SCENE.md's JSON.
+std::string statsJson(const RunStats& run);
+
+/// One frame without what differs from run to run (seconds, memory): for EXR headers, so that equal input gives equal
+/// bytes.
+std::string reproducibleStatsJson(const RunStats& run, const FrameStats& frame);
+
+}  // namespace mote

@@ -1,0 +1,95 @@
+// mote compare: how far two pictures are apart, and whether that is further than it may be.
+#include "host/image/compare.h"
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "host/core/error.h"
+#include "host/core/output_file.h"
+#include "host/image/exr.h"
+#include "tools/command.h"
+
+namespace mote {
+namespace {
+
+/// The limits by default are those that crosscheck holds CPU and GPU pictures to.
+struct CompareOptions {
+  std::string first, second, report, diff;
+  double maxRmse = 1e-3, minWithin = 0.999;
+};
+
+/// Why the pictures count as different; empty where they do not.
+std::vector<std::string> failures(const ImageDifference& d, const CompareOptions& options) {
+  std::vector<std::string> found;
+  if (!(d.overall.rmse <= options.maxRmse))
+    found.push_back(fmt::format("RMSE {:.3g} exceeds {:g}", d.overall.rmse, options.maxRmse));
+  if (!(d.within >= options.minWithin))
+    found.push_back(fmt::format("{:.4f} % of the pixels are within 2/255, less than {:g} %", 100 * d.within,
+                                100 * options.minWithin));
+  if (d.overall.notFinite > 0)
+    found.push_back(fmt::format("{} pixels are not finite and so cannot be compared", d.overall.notFinite));
+  return found;
+}
+
+void printDifference(const ImageDifference& d) {
+  fmt::print("{} × {} pixels\n", d.width, d.height);
+  fmt::print("{:<8}{:>12}{:>12}{:>12}   at\n", "", "RMSE", "mean", "max");
+  const auto row = [](const char* name, const ChannelDifference& c) {
+    fmt::print("{:<8}{:>12.3e}{:>12.3e}{:>12.3e}   {}, {}\n", name, c.rmse, c.mean, c.max, c.maxX, c.maxY);
+  };
+  const char* const names[] = {"R", "G", "B", "A"};
+  for (int c = 0; c < 4; ++c) row(names[c], d.channel[c]);
+  row("all", d.overall);
+  fmt::print("PSNR {}, within 2/255: {:.4f} % of the pixels\n",
+             std::isfinite(d.psnr) ? fmt::format("{:.1f} dB", d.psnr) : "infinite (no difference)", 100 * d.within);
+}
+
+std::string reportJson(const ImageDifference& difference, const CompareOptions& options, const std::vector<std::string>& failed) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::parse(differenceJson(difference));
+  json["first"] = options.first, json["second"] = options.second;
+  json["limits"] = {{"rmse", options.maxRmse}, {"within", options.minWithin}};
+  json["failures"] = failed;
+  json["passed"] = failed.empty();
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+/// Returns whether the pictures are as alike as they must be.
+bool compare(const CompareOptions& options) {
+  for (const std::string& path : {options.report, options.diff})
+    if (!path.empty()) const OutputFile probe(path);  // so that a bad name leaves nothing half done
+  const Image first = readExr(options.first), second = readExr(options.second);
+  if (first.width != second.width || first.height != second.height)
+    throw InputError(options.second, "size", fmt::format("{} × {} as {}", first.width, first.height, options.first),
+                     fmt::format("{} × {}", second.width, second.height));
+  const ImageDifference difference = compareImages(first, second);
+  const std::vector<std::string> failed = failures(difference, options);
+  if (!options.diff.empty()) writeDifferencePng(options.diff, first, second);
+  if (!options.report.empty()) writeWholeFile(options.report, reportJson(difference, options, failed));
+  printDifference(difference);
+  for (const std::string& failure : failed) fmt::print("differs: {}\n", failure);
+  return failed.empty();
+}
+
+}  // namespace
+
+void addCompareCommand(CLI::App& app, const CommonOptions&, int& exitCode) {
+  auto options = std::make_shared<CompareOptions>();
+  CLI::App* command = app.add_subcommand("compare", "Measure how far two pictures are apart; exit 1 where it is too far");
+  command->add_option("first", options->first, "OpenEXR picture")->required()->type_name("A.exr");
+  command->add_option("second", options->second, "OpenEXR picture of the same size")->required()->type_name("B.exr");
+  command->add_option("--report", options->report, "Write the differences as JSON")->type_name("OUT.json");
+  command->add_option("--diff", options->diff, "Write 64 × the difference as a picture")->type_name("OUT.png");
+  command->add_option("--max-rmse", options->maxRmse, "Greatest RMSE that passes; 1e-3, crosscheck's, by default")
+      ->type_name("X")
+      ->check(CLI::NonNegativeNumber.description(""));
+  command
+      ->add_option("--within", options->minWithin,
+                   "Least share of pixels that differ by at most 2/255; 0.999, crosscheck's, by default")
+      ->type_name("SHARE")
+      ->check(CLI::Range(0.0, 1.0).description(""));
+  command->callback([options, &exitCode] { exitCode = compare(*options) ? 0 : 1; });
+}
+
+}  // namespace mote

@@ -1,0 +1,106 @@
+// mote info: what a particle file, a picture or a scene holds.
+#include "tools/info.h"
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "host/core/error.h"
+#include "host/image/exr.h"
+#include "host/particles/missing_file.h"
+#include "host/particles/prt_format.h"
+#include "tools/command.h"
+
+namespace mote {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+enum class Kind { Particles, Picture, Scene };
+
+/// By the first bytes; by the name only where those say nothing, so that a damaged file gets its own reader's message.
+Kind kindOf(const std::string& path) {
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) throw InputError(path, "", "a file", "no such file", nearestNames(path, path));
+  if (fs::is_directory(path, ignored)) throw InputError(path, "", "a file", "a folder");
+  std::ifstream file(path, std::ios::binary);
+  char start[8] = {};
+  file.read(start, sizeof start);
+  if (!file.is_open()) throw InputError(path, "", "a file that can be read", "no permission to");
+  constexpr char kExrMagic[] = {'\x76', '\x2f', '\x31', '\x01'};
+  if (std::memcmp(start, kPrtMagic, sizeof kPrtMagic) == 0) return Kind::Particles;
+  if (std::memcmp(start, kExrMagic, sizeof kExrMagic) == 0) return Kind::Picture;
+  const fs::path extension = fs::path(path).extension();
+  if (extension == ".prt") return Kind::Particles;
+  if (extension == ".exr") return Kind::Picture;
+  if (extension == ".json") return Kind::Scene;
+  throw InputError(path, "", "a PRT particle file, an OpenEXR picture or a scene (.json)", "none of these",
+                   "of a scene's other inputs mote info says nothing");
+}
+
+void info(const std::vector<std::string>& files, bool json) {
+  for (const std::string& path : files) {
+    const Kind kind = kindOf(path);
+    const Json found = kind == Kind::Particles ? describeParticles(path)
+                       : kind == Kind::Picture ? describePicture(path)
+                                               : describeScene(path);
+    if (json)  // one line a file: what jq and every line-wise reader takes
+      fmt::print("{}\n", found.dump(-1, ' ', false, Json::error_handler_t::replace));
+    else
+      kind == Kind::Particles ? printParticles(found) : kind == Kind::Picture ? printPicture(found) : printScene(found);
+  }
+}
+
+}  // namespace
+
+Json describePicture(const std::string& path) {
+  const Image image = readExr(path);
+  std::size_t notFinite = 0;
+  for (const vec4& p : image.pixels) notFinite += !std::isfinite(p.r + p.g + p.b + p.a);
+  Json channels = Json::array(), attributes = Json::object();
+  for (const ExrChannel& channel : exrChannels(path)) channels.push_back({{"name", channel.name}, {"type", channel.type}});
+  for (const auto& [name, value] : exrStrings(path)) attributes[name] = value;
+  return {{"file", path},         {"kind", "picture"},       {"width", image.width},      {"height", image.height},
+          {"channels", channels}, {"not_finite", notFinite}, {"attributes", attributes}};
+}
+
+void printPicture(const Json& info) {
+  fmt::print("{}: OpenEXR, {} × {} pixels\n", info["file"].get<std::string>(), info["width"].get<int>(),
+             info["height"].get<int>());
+  fmt::print("  channels    ");
+  for (const Json& channel : info["channels"])
+    fmt::print(" {} ({})", channel["name"].get<std::string>(), channel["type"].get<std::string>());
+  fmt::print("\n  not finite   {} pixels\n", info["not_finite"].get<std::size_t>());
+  constexpr std::size_t kShown = 200;  // Mote's own statistics are longer; --json gives all of them
+  for (const auto& [name, value] : info["attributes"].items()) {
+    const auto text = value.get<std::string>();
+    fmt::print("  {:<12} {}{}\n", name, text.substr(0, kShown),
+               text.size() > kShown ? fmt::format("… ({} bytes; --json shows all)", text.size()) : "");
+  }
+}
+
+std::string bytesText(double bytes) {
+  if (bytes < 1e3) return fmt::format("{:.0f} B", bytes);
+  if (bytes < 1e6) return fmt::format("{:.1f} kB", bytes / 1e3);
+  if (bytes < 1e9) return fmt::format("{:.1f} MB", bytes / 1e6);
+  return fmt::format("{:.2f} GB", bytes / 1e9);
+}
+
+void addInfoCommand(CLI::App& app, const CommonOptions&, int&) {
+  struct InfoOptions {
+    std::vector<std::string> files;
+    bool json = false;
+  };
+  auto options = std::make_shared<InfoOptions>();
+  CLI::App* command = app.add_subcommand("info", "Say what particle files, pictures and scenes hold");
+  command->add_option("files", options->files, "PRT files, OpenEXR pictures, scenes (.json)")->required()->type_name("FILE");
+  command->add_flag("--json", options->json, "Print one JSON object a file, each on a line of its own");
+  command->callback([options] { info(options->files, options->json); });
+}
+
+}  // namespace mote

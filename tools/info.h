@@ -1,0 +1,26 @@
+// What `mote info` finds out about one file, as the object that --json prints; text for people is made from it.
+#pragma once
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+namespace mote {
+
+/// A PRT file: version, count, channels with the least, mean and greatest of their finite numbers, metadata, bounds and
+/// radius. Not-finite numbers are counted, never refused. Throws InputError as PrtReader does. Reads the particles once
+/// for every GiB of them, which it holds at once.
+nlohmann::ordered_json describeParticles(const std::string& path);
+void printParticles(const nlohmann::ordered_json& info);
+
+/// An OpenEXR picture: size, channels, not-finite pixels, string attributes. Throws InputError as readExr does.
+nlohmann::ordered_json describePicture(const std::string& path);
+void printPicture(const nlohmann::ordered_json& info);
+
+/// A scene and what its first frame will take; of particle files only the headers are read. Throws InputError where the
+/// scene or one of these files is wrong.
+nlohmann::ordered_json describeScene(const std::string& path);
+void printScene(const nlohmann::ordered_json& info);
+
+/// Decimal units: "950 B", "27.4 MB".
+std::string bytesText(double bytes);
+
+}  // namespace mote

@@ -1,0 +1,122 @@
+// mote render: a scene's frames to EXR pictures and PNG previews.
+#include "tools/render.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+
+#include "host/core/error.h"
+#include "host/core/log.h"
+#include "host/core/output_file.h"
+#include "host/core/parallel.h"
+#include "host/core/timer.h"
+#include "host/image/png.h"
+#include "host/scene/frame_path.h"
+#include "host/scene/scene_reader.h"
+
+namespace mote {
+namespace {
+
+struct RenderOptions {
+  SceneOptions scene;
+  std::string output, frames, size, lighting, raster, preview, exposure = "auto", stats;
+};
+
+/// Everything that flags change, in the scene itself.
+void applyFlags(const RenderOptions& options, Scene& scene) {
+  if (!options.output.empty()) scene.output.file = options.output;
+  if (!options.size.empty()) scene.output.size = parseSize(options.size);
+  if (!options.frames.empty()) {
+    const FrameRange range = parseFrameRange(options.frames);
+    scene.frames.first = range.first, scene.frames.last = range.last, scene.frames.step = range.step;
+  }
+  scene.lighting.backend = parseBackend("--lighting", options.lighting, scene.lighting.backend);
+  scene.view.backend = parseBackend("--raster", options.raster, scene.view.backend);
+}
+
+std::optional<float> parseExposure(const std::string& text) {
+  if (text == "auto") return std::nullopt;
+  char* end = nullptr;
+  const float value = std::strtof(text.c_str(), &end);
+  if (text.empty() || *end != '\0' || !(std::abs(value) <= 100))
+    throw InputError("--exposure", "", "a number of stops from -100 to 100, or auto", "\"" + text + "\"");
+  return value;
+}
+
+/// Every place that will be written is tried before any work: an artist must not learn of a typo after an hour.
+void checkOutputs(const RenderOptions& options, const Scene& scene) {
+  const bool several = scene.frames.first + scene.frames.step <= scene.frames.last;
+  for (const std::string& pattern : {scene.output.file, options.preview}) {
+    if (pattern.empty()) continue;
+    if (several && !hasFramePattern(pattern))
+      throw InputError(pattern, "", "#### in the name, since there are several frames",
+                       "the same name for all of them", "frame.####.exr, for example");
+    OutputFile probe(framePath(pattern, scene.frames.first));
+  }
+  if (!options.stats.empty()) OutputFile probe(options.stats);
+}
+
+void renderFrame(Scene& scene, int number, const RenderOptions& options, Renderer& renderer, RunStats& run) {
+  FrameStats stats;
+  Timer total;
+  const std::string path = framePath(scene.output.file, number);
+  const Frame frame = prepareFrame(scene, number, stats);
+  std::vector<layout::SplatParticle> splats;
+  {
+    const LitParticles lit = renderer.light(frame, false, stats);
+    splats = splatParticles(frame, scene.medium, lit);
+  }
+  const Image image = renderer.draw(frame, splats, scene.output.depth, stats);
+  Timer write;
+  stats.warnings = takeWarnings();
+  writeFrameExr(path, image, frame, scene, run, stats);
+  if (!options.preview.empty())
+    writePng(framePath(options.preview, number), image,
+             parseExposure(options.exposure).value_or(autoExposure(image)));
+  stats.seconds["write"] = write.seconds();
+  stats.seconds["total"] = total.seconds();
+  logInfo(fmt::format("frame {}: {} particles, {} lights, {:.1f} s (load {:.1f}, octree {:.1f}, lighting {:.1f}, sort "
+                      "{:.1f}, splat {:.1f}, write {:.1f}) -> {}",
+                      number, stats.particles, stats.lights, stats.seconds["total"], stats.seconds["load"],
+                      stats.seconds["octree"], stats.seconds["lighting"], stats.seconds["sort"],
+                      stats.seconds["splat"], stats.seconds["write"], path));
+  run.frames.push_back(std::move(stats));
+}
+
+void render(const RenderOptions& options, const CommonOptions& common) {
+  Scene scene = readScene(options.scene.scene, options.scene.overrides);
+  applyFlags(options, scene);
+  parseExposure(options.exposure);
+  checkOutputs(options, scene);
+
+  std::unique_ptr<Gpu> gpu;
+  const Backends backends = chooseBackends(scene.lighting.backend, scene.view.backend, deviceOptions(common), gpu);
+  RunStats run;
+  run.device = gpu ? gpu->device().name() : "none";
+  run.lighting = backends.gpuLighting ? "gpu" : "cpu";
+  run.raster = backends.gpuRaster ? "gpu" : "cpu";
+  run.threads = threadCount();
+  Renderer renderer(backends, gpu.get());
+  for (int number = scene.frames.first; number <= scene.frames.last; number += scene.frames.step)
+    renderFrame(scene, number, options, renderer, run);
+  requireNoValidationMessages(gpu.get());
+  if (!options.stats.empty()) writeWholeFile(options.stats, statsJson(run));
+}
+
+}  // namespace
+
+void addRenderCommand(CLI::App& app, const CommonOptions& common, int&) {
+  auto options = std::make_shared<RenderOptions>();
+  CLI::App* command = app.add_subcommand("render", "Render a scene to OpenEXR");
+  addSceneOptions(*command, options->scene);
+  command->add_option("-o,--output", options->output, "Picture to write; #### is the frame number")->type_name("OUT.exr");
+  command->add_option("--frames", options->frames, "Frames A-B, or A-BxS for every S-th")->type_name("A-B[xS]");
+  command->add_option("--size", options->size, "Picture size in pixels")->type_name("WxH");
+  command->add_option("--lighting", options->lighting, "Where lighting runs: cpu, gpu or auto")->type_name("WHERE");
+  command->add_option("--raster", options->raster, "Where splats are drawn: cpu, gpu or auto")->type_name("WHERE");
+  command->add_option("--preview", options->preview, "Also write an sRGB preview")->type_name("OUT.png");
+  command->add_option("--exposure", options->exposure, "Stops for the preview, or auto")->type_name("EV");
+  command->add_option("--stats", options->stats, "Write counts, seconds and memory as JSON")->type_name("OUT.json");
+  command->callback([options, &common] { render(*options, common); });
+}
+
+}  // namespace mote

@@ -1,0 +1,40 @@
+// What the commands that take a scene share: how a scene is opened, and how a frame becomes files.
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "engine/renderer.h"
+#include "tools/command.h"
+
+namespace CLI {
+class App;
+}
+
+namespace mote {
+
+/// Flags that change a scene before it is used.
+struct SceneOptions {
+  std::string scene;
+  std::vector<std::string> overrides;  ///< --set
+};
+
+/// Adds SCENE and --set.
+void addSceneOptions(CLI::App& command, SceneOptions& options);
+
+/// "cpu", "gpu" or "auto"; throws InputError naming `flag` otherwise. Empty keeps `fallback`.
+Backend parseBackend(const std::string& flag, const std::string& text, Backend fallback);
+
+DeviceOptions deviceOptions(const CommonOptions& common);
+
+/// Any message of the validation layers makes the run a failure of the machine: throws MachineError with all of them.
+void requireNoValidationMessages(const Gpu* gpu);
+
+/// Writes the EXR with camera matrices, frame, fps and the reproducible statistics in its header.
+void writeFrameExr(const std::string& path, const Image& image, const Frame& frame, const Scene& scene,
+                   const RunStats& run, const FrameStats& stats);
+
+/// Exposure in stops that brings the 99th percentile of the pixels that hold anything to 0.9.
+float autoExposure(const Image& image);
+
+}  // namespace mote

@@ -1,0 +1,66 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+
+#include "host/core/error.h"
+#include "host/image/exr.h"
+#include "host/splat/splat.h"
+#include "tools/render.h"
+
+namespace mote {
+
+void addSceneOptions(CLI::App& command, SceneOptions& options) {
+  command.add_option("scene", options.scene, "Scene file (JSON)")->required()->type_name("SCENE");
+  command.add_option("--set", options.overrides, "Change a value of the scene: /json/pointer=VALUE; may be repeated")
+      ->type_name("/POINTER=VALUE")
+      ->expected(1)
+      ->take_all();
+}
+
+Backend parseBackend(const std::string& flag, const std::string& text, Backend fallback) {
+  if (text.empty()) return fallback;
+  if (text == "cpu") return Backend::Cpu;
+  if (text == "gpu") return Backend::Gpu;
+  if (text == "auto") return Backend::Auto;
+  throw InputError(flag, "", "cpu, gpu or auto", "\"" + text + "\"");
+}
+
+DeviceOptions deviceOptions(const CommonOptions& common) {
+  return {.device = common.device, .validate = common.validate};
+}
+
+void requireNoValidationMessages(const Gpu* gpu) {
+  if (!gpu) return;
+  const std::vector<std::string> messages = gpu->validationMessages();
+  if (messages.empty()) return;
+  std::string text = fmt::format("the Vulkan validation layers report {} messages:", messages.size());
+  for (const std::string& message : messages) text += "\n  " + message;
+  throw MachineError(text);
+}
+
+void writeFrameExr(const std::string& path, const Image& image, const Frame& frame, const Scene& scene,
+                   const RunStats& run, const FrameStats& stats) {
+  ExrOptions options;
+  options.precision = scene.output.precision == Precision::Half ? ExrPrecision::Half : ExrPrecision::Float;
+  options.compression = static_cast<ExrCompression>(scene.output.compression);  // the same names in the same order
+  options.worldToCamera = worldToCamera(frame.view);
+  options.worldToNDC = worldToNdc(frame.view);
+  options.framesPerSecond = scene.frames.fps;
+  options.frame = frame.number;
+  options.strings = {{"mote:version", MOTE_VERSION}, {"mote:stats", reproducibleStatsJson(run, stats)}};
+  writeExr(path, image, options);
+}
+
+float autoExposure(const Image& image) {
+  std::vector<float> brightness;
+  for (const vec4& pixel : image.pixels) {
+    const float greatest = std::max({pixel.r, pixel.g, pixel.b});
+    if (pixel.a > 1e-3f && greatest > 0 && std::isfinite(greatest)) brightness.push_back(greatest);
+  }
+  if (brightness.empty()) return 0;
+  const auto percentile = brightness.begin() + static_cast<std::ptrdiff_t>((brightness.size() - 1) * 99 / 100);
+  std::nth_element(brightness.begin(), percentile, brightness.end());
+  return std::log2(0.9f / *percentile);
+}
+
+}  // namespace mote
