@@ -173,11 +173,10 @@ std::vector<std::string> missingLimits(const VkPhysicalDeviceLimits& limits) {
   const auto need = [&](std::uint64_t has, std::uint64_t needed, const char* name) {
     if (has < needed) missing.push_back(fmt::format("limit {}: {} needed, {} there", name, needed, has));
   };
-  // Every number is what a shader or pass uses; the Vulkan minimum is less for some of them.
+  // Every number is what a shader or pass uses. No shader has shared memory.
   need(limits.maxPushConstantsSize, 128, "maxPushConstantsSize");
-  need(limits.maxComputeSharedMemorySize, 16384, "maxComputeSharedMemorySize");
-  need(limits.maxComputeWorkGroupInvocations, 256, "maxComputeWorkGroupInvocations");
-  need(limits.maxComputeWorkGroupSize[0], 256, "maxComputeWorkGroupSize[0]");
+  need(limits.maxComputeWorkGroupInvocations, 64, "maxComputeWorkGroupInvocations");
+  need(limits.maxComputeWorkGroupSize[0], 64, "maxComputeWorkGroupSize[0]");
   need(limits.maxColorAttachments, 2, "maxColorAttachments");
   need(limits.maxGeometryOutputVertices, 4, "maxGeometryOutputVertices");
   if (!limits.timestampComputeAndGraphics) missing.push_back("limit timestampComputeAndGraphics");

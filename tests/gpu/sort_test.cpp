@@ -8,6 +8,7 @@
 #include "engine/passes/depth_key_pass.h"
 #include "engine/passes/sort_pass.h"
 #include "host/core/random.h"
+#include "host/splat/splat.h"
 #include "shaders/glsl/layout/sort.h"
 #include "shaders/glsl/layout/splat.h"
 #include "tests/gpu/gpu_fixture.h"
@@ -139,6 +140,7 @@ class DepthKeyTest : public GpuTest {
     for (std::uint32_t i = 0; i < count; ++i) {
       ASSERT_EQ(pairs[i].index, i);
       const vec3& p = particles[i].position;
+      ASSERT_EQ(pairs[i].key, depthKey(p, camera, scale)) << "particle " << i;
       ASSERT_EQ(pairs[i].key, referenceKey(p, camera, scale))
           << "particle " << i << " at " << p.x << " " << p.y << " " << p.z;
     }

@@ -1,0 +1,165 @@
+// The scenes' part of `mote info`: what they hold, and an estimate of what their first frame takes.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "host/core/error.h"
+#include "host/core/parallel.h"
+#include "host/octree/octree.h"
+#include "host/particles/missing_file.h"
+#include "host/particles/prt_reader.h"
+#include "host/scene/frame_path.h"
+#include "host/scene/scene_reader.h"
+#include "shaders/glsl/layout/node.h"
+#include "shaders/glsl/layout/sort.h"
+#include "shaders/glsl/layout/splat.h"
+#include "tools/info.h"
+
+namespace mote {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// One source as far as its header or the scene tells.
+struct SourceFacts {
+  std::uint64_t count = 0;
+  std::string from, radius;
+  bool color = false, velocity = false, id = false;
+};
+
+const char* nameOf(Generator generator) {
+  switch (generator) {
+    case Generator::Ball: return "ball";
+    case Generator::Cloud: return "cloud";
+    case Generator::Plume: return "plume";
+    case Generator::None: break;
+  }
+  return "none";
+}
+
+std::string radiusText(const ParticleSource& source, bool hasChannel) {
+  const RadiusRule& rule = source.radius;
+  if (rule.kind == RadiusRule::Kind::Number) return fmt::format("{:g}", rule.value);
+  if (rule.kind == RadiusRule::Kind::Channel) return fmt::format("channel {} × {:g}", rule.channel, rule.scale);
+  return hasChannel ? "channel Radius" : "auto: 1.5 × the mean distance to the nearest 8";
+}
+
+SourceFacts fileFacts(const ParticleSource& source, int frame) {
+  const std::string path = framePath(source.file, frame);
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored))
+    throw InputError(path, "", "a particle file", "no such file", nearestNames(source.file, path));
+  const PrtReader file(path);
+  const auto has = [&](const std::string& ours) {
+    const auto renamed = source.channels.find(ours);
+    return file.header().channel(renamed == source.channels.end() ? ours : renamed->second) != nullptr;
+  };
+  return {file.count(), path, radiusText(source, has("Radius")), has("Color"), has("Velocity"), has("ID")};
+}
+
+SourceFacts factsOf(const ParticleSource& source, int frame) {
+  if (!source.file.empty()) return fileFacts(source, frame);
+  return {source.count, nameOf(source.generate), radiusText(source, true), false, source.generate == Generator::Plume, true};
+}
+
+/// Bytes that the stages of one frame hold at their peak. Everything that grows with the particles or the picture is
+/// counted; what a driver, the program itself and reading ahead take is not.
+struct MemoryNeed {
+  double host = 0, device = 0;
+};
+
+MemoryNeed memoryNeed(double particles, const std::vector<SourceFacts>& sources, const Scene& scene) {
+  // Leaves are cells, and those are about 40 % full; inner nodes add a seventh. Measured for the three generators at
+  // 32 a cell: 0.08 to 0.10 nodes a particle.
+  const double perCell = scene.lighting.particlesPerCell > 0 ? scene.lighting.particlesPerCell : kDefaultParticlesPerCell;
+  const double nodes = std::min(2.0, 2.9 / perCell) * sizeof(layout::Node);
+  const auto any = [&](bool SourceFacts::*has) { return std::any_of(sources.begin(), sources.end(), [&](const SourceFacts& s) { return s.*has; }); };
+  const double set = 12 + 4 + 4 + 12 * any(&SourceFacts::color) + 12 * any(&SourceFacts::velocity) + 8 * any(&SourceFacts::id);
+  constexpr double kTree = 6 * 4;                                   // x, y, z, radius, peak, source
+  constexpr double kDraw = sizeof(layout::SplatParticle) + 12;      // with radiance, or with (key, index) and order
+  constexpr double kLightDevice = 16 + 4 + 4 + 4;                   // position and radius, peak, order, optical depth
+  constexpr double kDrawDevice = sizeof(layout::SplatParticle) + sizeof(layout::SortPair) + 4;
+  const double depth = scene.output.depth ? 4 : 0;
+  const double pixels = double(scene.output.size.x) * scene.output.size.y;
+  const double half = scene.output.precision == Precision::Half ? 8 : 0;
+  return {.host = particles * (set + kTree + nodes + kDraw) + pixels * (16 + depth + half),
+          .device = std::max(particles * (nodes + kLightDevice), particles * kDrawDevice + pixels * (16 + depth))};
+}
+
+/// 1 µs a ray on two cores for a million particles (host/lighting/lighting.h); a ray meets the more, the more there are
+/// beside each other: N^(1/3) (DESIGN §5).
+double raySeconds(double particles) { return 2e-6 * std::cbrt(particles / 1e6) / threadCount(); }
+
+Json lightsJson(const Scene& scene) {
+  if (scene.defaultLights) return {{{"name", "key"}, {"type", "point"}, {"casts_shadows", true}, {"fitted", true}}};
+  Json list = Json::array();
+  for (const LightSource& light : scene.lights)
+    list.push_back({{"name", light.name},
+                    {"type", light.type == LightType::Point ? "point" : "directional"},
+                    {"casts_shadows", light.castsShadows && light.shadowDensity > 0}});
+  return list;
+}
+
+std::string listed(const Json& lights) {
+  std::string text;
+  for (const Json& light : lights)
+    text += fmt::format("{}{} ({}{})", text.empty() ? "" : ", ", light["name"].get<std::string>(),
+                        light["type"].get<std::string>(), light.contains("fitted") ? ", fitted to the particles" : "");
+  return text.empty() ? "none" : text;
+}
+
+}  // namespace
+
+Json describeScene(const std::string& path) {
+  const Scene scene = readScene(path);
+  std::vector<SourceFacts> facts;
+  Json sources = Json::array();
+  std::uint64_t particles = 0;
+  for (const ParticleSource& source : scene.particles) {
+    facts.push_back(factsOf(source, scene.frames.first));
+    particles += facts.back().count;
+    sources.push_back({{source.file.empty() ? "generate" : "file", facts.back().from},
+                       {"count", facts.back().count},
+                       {"radius", facts.back().radius}});
+  }
+  const Json lights = lightsJson(scene);
+  const auto shadows = std::count_if(lights.begin(), lights.end(), [](const Json& l) { return l["casts_shadows"] == true; });
+  const double count = static_cast<double>(particles), rays = count * static_cast<double>(shadows);
+  const MemoryNeed need = memoryNeed(count, facts, scene);
+  return {{"file", path},
+          {"kind", "scene"},
+          {"particles", particles},
+          {"sources", sources},
+          {"lights", lights},
+          {"size", {scene.output.size.x, scene.output.size.y}},
+          {"output", scene.output.file},
+          {"frames", {{"first", scene.frames.first}, {"last", scene.frames.last}, {"step", scene.frames.step}}},
+          {"estimate",
+           {{"host_bytes", std::round(need.host)},
+            {"device_bytes", std::round(need.device)},
+            {"rays", rays},
+            {"threads", threadCount()},
+            {"lighting_seconds", rays * raySeconds(count)}}}};
+}
+
+void printScene(const Json& info) {
+  const auto row = [](const char* name, const std::string& text) { fmt::print("  {:<12} {}\n", name, text); };
+  fmt::print("{}: scene of {} particles\n", info["file"].get<std::string>(), info["particles"].get<std::uint64_t>());
+  for (const Json& source : info["sources"]) {
+    const bool generated = source.contains("generate");
+    row(generated ? "generated" : "file",
+        fmt::format("{}: {} particles, radius: {}", source[generated ? "generate" : "file"].get<std::string>(),
+                    source["count"].get<std::uint64_t>(), source["radius"].get<std::string>()));
+  }
+  const Json &frames = info["frames"], &estimate = info["estimate"];
+  row("lights", listed(info["lights"]));
+  row("picture", fmt::format("{} × {}, {}", info["size"][0].get<int>(), info["size"][1].get<int>(), info["output"].get<std::string>()));
+  row("frames", fmt::format("{} to {}, every {}", frames["first"].get<int>(), frames["last"].get<int>(), frames["step"].get<int>()));
+  row("memory", fmt::format("about {}; on a Vulkan device about {}", bytesText(estimate["host_bytes"].get<double>()),
+                            bytesText(estimate["device_bytes"].get<double>())));
+  row("work", fmt::format("{:.0f} rays a frame, about {:.2g} s with {} threads", estimate["rays"].get<double>(),
+                          estimate["lighting_seconds"].get<double>(), estimate["threads"].get<unsigned>()));
+}
+
+}  // namespace mote
