@@ -1,5 +1,6 @@
 // The particle files' part of `mote info`: statistics of raw channels, whatever their types.
 #include <Imath/half.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>

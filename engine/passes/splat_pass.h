@@ -18,7 +18,7 @@ struct SplatTarget {
 
 /// Draws what rasterize() in host/splat/splat.h draws, by the same operations (lib/footprint.glsl): the same pixels,
 /// the same depths, colours equal but for what the device's division, square root and blending round differently:
-/// nothing at all on lavapipe. Cost on lavapipe with 2 cores: about 1.1 s for a million splats of 4 pixels' radius.
+/// nothing at all on lavapipe. Cost on lavapipe with 2 cores: about 1.2 s for a million splats of 4 pixels' radius.
 class SplatPass {
  public:
   /// Points of one submission: seconds on a software device, far below the watchdog of a hardware driver.

@@ -192,32 +192,31 @@ class Sink {
 void writeParticles(Sink& sink, const Layout& layout, std::span<const PrtColumn> columns, int level) {
   const std::size_t perPiece = std::max<std::size_t>(1, kBlockBytes / layout.particleBytes);
   uLong adler = adler32_z(0, nullptr, 0);
-  std::size_t next = 0;
-  bool started = false;
+  std::size_t next = 0, turn = 0;
+  // Pieces leave the pipeline in order, so a slot is free again when its turn comes; and they are ours to delete if a
+  // full disk cancels the pipeline half-way.
+  std::vector<Piece> ring(2 * threadCount() + 2);
   // zlib header (RFC 1950): deflate with a 32 KiB window; the second byte makes the pair a multiple of 31.
   sink.write(std::string_view("\x78\x01", 2));
-  const auto begin = [&](tbb::flow_control& flow) -> std::shared_ptr<Piece> {
-    if (started && next == layout.count) return flow.stop(), nullptr;  // an empty file still gets one, empty, piece
-    started = true;
-    auto piece = std::make_shared<Piece>();
-    piece->begin = next;
-    piece->end = next = std::min(layout.count, next + perPiece);
-    return piece;
+  const auto begin = [&](tbb::flow_control& flow) -> Piece* {
+    if (turn > 0 && next == layout.count) return flow.stop(), nullptr;  // an empty file still gets one, empty, piece
+    Piece& piece = ring[turn++ % ring.size()];
+    piece.begin = next;
+    piece.end = next = std::min(layout.count, next + perPiece);
+    return &piece;
   };
-  const auto compress = [&](std::shared_ptr<Piece> piece) {
+  const auto compress = [&](Piece* piece) {
     deflatePiece(interleave(layout, columns, piece->begin, piece->end), level, piece->end == layout.count, *piece);
     return piece;
   };
-  const auto write = [&](const std::shared_ptr<Piece>& piece) {
+  const auto write = [&](Piece* piece) {
     adler = adler32_combine(adler, piece->adler, static_cast<z_off_t>(piece->rawBytes));
     sink.write(piece->deflated);
   };
   using tbb::filter_mode;
-  using Shared = std::shared_ptr<Piece>;
-  tbb::parallel_pipeline(2 * threadCount() + 2,
-                         tbb::make_filter<void, Shared>(filter_mode::serial_in_order, begin) &
-                             tbb::make_filter<Shared, Shared>(filter_mode::parallel, compress) &
-                             tbb::make_filter<Shared, void>(filter_mode::serial_in_order, write));
+  tbb::parallel_pipeline(ring.size(), tbb::make_filter<void, Piece*>(filter_mode::serial_in_order, begin) &
+                                          tbb::make_filter<Piece*, Piece*>(filter_mode::parallel, compress) &
+                                          tbb::make_filter<Piece*, void>(filter_mode::serial_in_order, write));
   const char checksum[4] = {static_cast<char>(adler >> 24), static_cast<char>(adler >> 16),
                             static_cast<char>(adler >> 8), static_cast<char>(adler)};
   sink.write(std::string_view(checksum, sizeof checksum));
