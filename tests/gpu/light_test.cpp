@@ -1,0 +1,113 @@
+// The compute shader against the host, particle by particle, under every rule.
+#include <cmath>
+
+#include "engine/passes/light_pass.h"
+#include "host/core/random.h"
+#include "host/lighting/medium.h"
+#include "tests/gpu/gpu_fixture.h"
+
+namespace mote {
+namespace {
+
+constexpr layout::uint kFalloffs[] = {layout::kFalloffSmooth, layout::kFalloffLinear, layout::kFalloffSphere};
+constexpr layout::uint kEndpoints[] = {layout::kEndpointSoft, layout::kEndpointClamp};
+
+layout::Light pointLight(const vec3& position) {
+  return {.position = position, .type = layout::kLightPoint, .direction = {0, -1, 0}, .decay = 2, .power = vec3(1),
+          .shadowDensity = 1, .castsShadows = 1};
+}
+layout::Light directionalLight(const vec3& direction) {
+  return {.position = {}, .type = layout::kLightDirectional, .direction = glm::normalize(direction), .decay = 0,
+          .power = vec3(1), .shadowDensity = 1, .castsShadows = 1};
+}
+
+/// Uniform in the unit ball with log-uniform radii, some at equal positions, one at `light`.
+Octree ballTree(std::size_t count, double least, double greatest, double opticalDepth, layout::uint falloff,
+                const vec3& light) {
+  std::vector<vec3> position;
+  std::vector<float> radius, density;
+  for (std::size_t i = 0; i < count; ++i) {
+    Random random(21, i);
+    position.emplace_back(random.direction() * std::cbrt(random.uniform()));
+    radius.push_back(static_cast<float>(least * std::pow(greatest / least, random.uniform())));
+    density.push_back(static_cast<float>(opticalDepth * 4.0 / 3.0 * kPi / static_cast<double>(count)));
+    if (i % 50 == 1) position[i] = position[i - 1];
+  }
+  if (count > 10) position[7] = light;
+  return buildOctree(position, radius, peakOpticalDepths(density, radius, falloff, true, 1));
+}
+
+class LightPassTest : public GpuTest {
+ protected:
+  double worstTransmittance(const Octree& tree, const layout::Light& light, layout::uint falloff, layout::uint endpoint,
+                            float cutoff) {
+    LightPass pass(device(), falloff, endpoint);
+    pass.setTree(tree);
+    const std::vector<float> onDevice = transmittances(pass.opticalDepths(light, cutoff), light);
+    const std::vector<float> onHost = transmittances(opticalDepths(tree, light, {falloff, endpoint, cutoff}), light);
+    EXPECT_EQ(onDevice.size(), onHost.size());
+    double worst = 0;
+    for (std::size_t i = 0; i < onHost.size(); ++i) {
+      const double delta = std::abs(double(onDevice[i]) - double(onHost[i]));
+      worst = std::isfinite(onDevice[i]) ? std::max(worst, delta) : INFINITY;
+    }
+    return worst;
+  }
+};
+
+TEST_F(LightPassTest, AgreesWithTheHostUnderEveryRule) {
+  const vec3 inside(0.2f, 0.1f, -0.3f);
+  double worst = 0;
+  for (const layout::uint falloff : kFalloffs) {
+    const Octree tree = ballTree(5000, 0.05, 0.15, 2, falloff, inside);
+    for (const layout::uint endpoint : kEndpoints)
+      for (const layout::Light& light : {pointLight(inside), pointLight({2, 3, 1}), directionalLight({0, -1, -0.3f}),
+                                         directionalLight({0, 0, 1})})
+        worst = std::max(worst, worstTransmittance(tree, light, falloff, endpoint, 0));
+  }
+  std::printf("worst |dT| with cutoff 0: %.2e\n", worst);
+  EXPECT_LE(worst, 2e-5);
+}
+
+TEST_F(LightPassTest, AgreesForRadiiOverThreeDecades) {
+  double worst = 0;
+  for (const layout::uint falloff : kFalloffs) {
+    const Octree tree = ballTree(5000, 0.0006, 0.6, 0.01, falloff, {0, 0, 0});
+    worst = std::max(worst, worstTransmittance(tree, pointLight({2, 3, 1}), falloff, layout::kEndpointSoft, 0));
+    worst = std::max(worst, worstTransmittance(tree, pointLight({0, 0, 0}), falloff, layout::kEndpointClamp, 0));
+  }
+  std::printf("worst |dT| for radii 1000:1: %.2e\n", worst);
+  EXPECT_LE(worst, 2e-5);
+}
+
+TEST_F(LightPassTest, StopsEarlyWithinTheCutoff) {
+  const Octree tree = ballTree(20000, 0.05, 0.05, 30, layout::kFalloffSmooth, {0, 0, 0});
+  // Where both stop, both transmittances lie between the true one and the cutoff.
+  EXPECT_LE(worstTransmittance(tree, directionalLight({0, -1, 0}), 0, 0, 1e-4f), 1e-4);
+  EXPECT_LE(worstTransmittance(tree, directionalLight({0, -1, 0}), 0, 0, 0.1f), 0.1);
+}
+
+TEST_F(LightPassTest, TakesAnyNumberOfParticles) {
+  for (const std::size_t count : {1, 2, 3, 63, 64, 65, 255, 256, 257, 1000})
+    EXPECT_LE(worstTransmittance(ballTree(count, 0.2, 0.4, 1, 0, {0, 0, 0}), pointLight({0, 2, 0}), 0, 0, 0), 2e-5) << count;
+}
+
+TEST_F(LightPassTest, GivesNothingForNoParticlesAndZerosWithoutShadows) {
+  LightPass pass(device(), 0, 0);
+  const Octree empty = buildOctree({}, {}, {});
+  pass.setTree(empty);
+  EXPECT_TRUE(pass.opticalDepths(pointLight({0, 1, 0}), 0).empty());
+  const Octree tree = ballTree(100, 0.2, 0.4, 1, 0, {0, 0, 0});
+  pass.setTree(tree);
+  layout::Light light = pointLight({0, 1, 0});
+  light.castsShadows = 0;
+  EXPECT_EQ(pass.opticalDepths(light, 0), std::vector<float>(100, 0.0f));
+}
+
+TEST_F(LightPassTest, SplitsMoreRaysThanOneSubmissionTakes) {
+  const Octree tree = ballTree(150000, 0.02, 0.02, 2, 0, {0, 0, 0});
+  EXPECT_LE(worstTransmittance(tree, pointLight({3, 0, 0}), 0, 0, 1e-4f), 1e-4);
+}
+
+}  // namespace
+}  // namespace mote

@@ -1,0 +1,218 @@
+// mote bench: what is common to all of them, and the command.
+#include "tools/bench/bench.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "host/core/error.h"
+#include "host/core/log.h"
+#include "host/core/output_file.h"
+#include "host/core/parallel.h"
+#include "host/core/timer.h"
+#include "host/lighting/kernel.h"
+#include "tools/render.h"
+
+namespace mote {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Benchmark {
+  const char *name, *about, *unit;
+  std::uint64_t count;  ///< default, which the floors are for
+  void (*run)(Bench&);
+};
+constexpr Benchmark kBenchmarks[] = {
+    {"lighting", "Build of the octree, and lighting on TBB against the compute shader", "particles", 1'000'000,
+     benchLighting},
+    {"sort", "tbb::parallel_sort against the bitonic sort on the device", "pairs", 1 << 20, benchSort},
+    {"splat", "Rasteriser on TBB against the splat pass on the device", "splats", 1'000'000, benchSplat},
+};
+constexpr std::uint64_t kLeastCount = 2;          // one particle has no spacing
+constexpr std::uint64_t kMostCount = 1ull << 30;  // SortPass::kMaxCount; the others run out of memory before
+constexpr int kMostRuns = 1000;
+
+void runOnce(const Contender& contender) {
+  if (contender.prepare) contender.prepare();
+  contender.work();
+}
+
+double secondsOf(const Contender& contender) {
+  if (contender.prepare) contender.prepare();
+  const Timer timer;
+  contender.work();
+  return timer.seconds();
+}
+
+/// "0.0986 s (0.0981 .. 0.1204)": median, least and greatest.
+std::string spread(const std::vector<double>& values, const char* unit) {
+  const auto [least, greatest] = std::minmax_element(values.begin(), values.end());
+  return fmt::format("{:.4g}{} ({:.4g} .. {:.4g})", median(values), unit, *least, *greatest);
+}
+
+/// "1.234 M/s".
+std::string rate(double count, double seconds) { return fmt::format("{:.4g} M/s", count / seconds * 1e-6); }
+
+void print(const Comparison& comparison) {
+  const auto count = static_cast<double>(comparison.count);
+  fmt::print("\n{}, {} {}\n", comparison.name, comparison.count, comparison.unit);
+  fmt::print("  check  {}: {}\n", comparison.check.text, comparison.check.passed ? "ok" : "DIFFERS");
+  if (!comparison.check.passed) fmt::print("  not timed, because the results are wrong\n");
+  if (!comparison.secondsA.empty())
+    fmt::print("  A      {:<36} {:>14}  {}\n", comparison.a, rate(count, comparison.medianA()),
+               spread(comparison.secondsA, " s"));
+  if (!comparison.secondsB.empty()) {
+    fmt::print("  B      {:<36} {:>14}  {}\n", comparison.b, rate(count, comparison.medianB()),
+               spread(comparison.secondsB, " s"));
+    fmt::print("  B / A  {}\n", spread(comparison.ratios(), ""));
+  }
+}
+
+void print(const Floor& floor) {
+  fmt::print("  {:<52} {:>8.4g}   floor {} {:<6.4g} {}\n", floor.text, floor.value, floor.atLeast ? "≥" : "≤",
+             floor.limit, floor.reached() ? "pass" : "below");
+}
+
+Json toJson(const Comparison& comparison) {
+  Json json = {{"name", comparison.name},
+               {"unit", comparison.unit},
+               {"count", comparison.count},
+               {"a", comparison.a},
+               {"b", nullptr},
+               {"ratio_median", nullptr},
+               {"ratio_min", nullptr},
+               {"ratio_max", nullptr},
+               {"seconds_a", comparison.secondsA},
+               {"seconds_b", comparison.secondsB},
+               {"check", {{"text", comparison.check.text}, {"passed", comparison.check.passed}}}};
+  if (!comparison.b.empty()) json["b"] = comparison.b;
+  if (const std::vector<double> ratios = comparison.ratios(); !ratios.empty()) {
+    const auto [least, greatest] = std::minmax_element(ratios.begin(), ratios.end());
+    json["ratio_median"] = median(ratios);
+    json["ratio_min"] = *least;
+    json["ratio_max"] = *greatest;
+  }
+  return json;
+}
+
+Json toJson(const Floor& floor) {
+  return {{"name", floor.text},
+          {"value", floor.value},
+          {"limit", floor.limit},
+          {"wanted", floor.atLeast ? "at least" : "at most"},
+          {"reached", floor.reached()}};
+}
+
+}  // namespace
+
+double median(std::vector<double> values) {
+  MOTE_CHECK(values.size(), >, 0u);
+  std::sort(values.begin(), values.end());
+  const std::size_t middle = values.size() / 2;
+  return values.size() % 2 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
+}
+
+double Comparison::medianA() const { return median(secondsA); }
+double Comparison::medianB() const { return median(secondsB); }
+
+std::vector<double> Comparison::ratios() const {
+  std::vector<double> ratios;
+  for (std::size_t run = 0; run < secondsB.size(); ++run) ratios.push_back(secondsB[run] / secondsA[run]);
+  return ratios;
+}
+
+Bench::Bench(const std::string& name, const BenchOptions& options, const CommonOptions& common)
+    : name_(name), options_(options) {
+  if (!options.report.empty()) {
+    const OutputFile probe(options.report);
+  }  // before any work
+  std::string why;
+  try {
+    gpu_ = std::make_unique<Gpu>(deviceOptions(common));
+  } catch (const MachineError& error) {
+    if (!common.device.empty()) throw;
+    why = error.what();
+  }
+  fmt::print("mote {} bench {}: {} threads, {}; {} timed runs of A and B in turn after one that is not counted\n",
+             MOTE_VERSION, name, threadCount(), simdTargets().front(), options.runs);
+  if (gpu_)
+    fmt::print("device: {}\n", gpu_->device().name());
+  else
+    fmt::print("device: none, so what runs on it is left out: {}\n", why);
+  if (common.validate) fmt::print("The validation layers are on: what runs on the device is slower than without.\n");
+}
+
+const Comparison* Bench::compare(const std::string& name, const std::string& unit, const Contender& a,
+                                 const std::optional<Contender>& b, const std::function<BenchCheck()>& check) {
+  Comparison comparison;
+  comparison.name = name;
+  comparison.unit = unit;
+  comparison.count = options_.count;
+  comparison.a = a.name;
+  if (b) comparison.b = b->name;
+  Progress progress(name, 1 + options_.runs);
+  runOnce(a);
+  if (b) runOnce(*b);
+  progress.advance(1);
+  comparison.check = check();
+  for (int run = 0; run < options_.runs && comparison.check.passed; ++run) {
+    comparison.secondsA.push_back(secondsOf(a));
+    if (b) comparison.secondsB.push_back(secondsOf(*b));
+    progress.advance(1);
+  }
+  print(comparison);
+  comparisons_.push_back(std::move(comparison));
+  return comparisons_.back().check.passed ? &comparisons_.back() : nullptr;
+}
+
+int Bench::finish(std::uint64_t floorCount) {
+  requireNoValidationMessages(gpu_.get());
+  if (!floors_.empty()) {
+    const bool same = options_.count == floorCount;
+    fmt::print("\nfloors, for {} on 2 cores{}:\n", floorCount,
+               same ? "" : fmt::format("; this was {}", options_.count));
+    for (const Floor& floor : floors_) print(floor);
+  }
+  if (!options_.report.empty()) writeWholeFile(options_.report, reportJson());
+  return std::all_of(comparisons_.begin(), comparisons_.end(), [](const Comparison& c) { return c.check.passed; }) ? 0
+                                                                                                                   : 1;
+}
+
+std::string Bench::reportJson() const {
+  Json runs = Json::array(), floors = Json::array();
+  for (const Comparison& comparison : comparisons_) runs.push_back(toJson(comparison));
+  for (const Floor& floor : floors_) floors.push_back(toJson(floor));
+  const Json root = {{"version", MOTE_VERSION},    {"device", gpu_ ? gpu_->device().name() : "none"},
+                     {"threads", threadCount()},   {"simd", simdTargets().front()},
+                     {"benchmark", name_},         {"runs", std::move(runs)},
+                     {"floors", std::move(floors)}};
+  return root.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void addBenchCommand(CLI::App& app, const CommonOptions& common, int& exitCode) {
+  CLI::App* bench =
+      app.add_subcommand("bench", "Time two ways of doing one thing against each other; 1 if their results differ");
+  bench->require_subcommand(1);
+  for (const Benchmark& benchmark : kBenchmarks) {
+    auto options = std::make_shared<BenchOptions>();
+    options->count = benchmark.count;
+    CLI::App* command = bench->add_subcommand(benchmark.name, benchmark.about);
+    command
+        ->add_option("--count", options->count,
+                     fmt::format("How many {}; {} by default", benchmark.unit, benchmark.count))
+        ->type_name("N")
+        ->check(CLI::Range(kLeastCount, kMostCount).description(""));
+    command->add_option("--runs", options->runs, fmt::format("Timed runs of each; {} by default", options->runs))
+        ->type_name("K")
+        ->check(CLI::Range(1, kMostRuns).description(""));
+    command->add_option("--report", options->report, "Write the seconds and ratios as JSON")->type_name("OUT.json");
+    command->callback([options, &benchmark, &common, &exitCode] {
+      Bench run(benchmark.name, *options, common);
+      benchmark.run(run);
+      exitCode = run.finish(benchmark.count);
+    });
+  }
+}
+
+}  // namespace mote

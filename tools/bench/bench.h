@@ -1,0 +1,98 @@
+// Benchmarks that hold two ways of doing one thing against each other in one run.
+//
+// Timings differ from run to run and from machine to machine by more than most changes do; the ratio of two timings
+// taken in turn differs by far less. So every benchmark has two contenders, A B A B …, whose results are checked
+// before any time is taken, and the median of the pairwise ratios is what to compare between machines and versions.
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/vulkan/gpu.h"
+#include "tools/command.h"
+
+namespace mote {
+
+struct BenchOptions {
+  std::uint64_t count = 0;  ///< particles or pairs
+  int runs = 5;             ///< timed runs of each contender, ≥ 1, after one that is not counted
+  std::string report;       ///< JSON file; empty: none
+};
+
+/// One way of doing it. `work` leaves its result where the check looks for it.
+struct Contender {
+  std::string name;
+  std::function<void()> work;          ///< timed
+  std::function<void()> prepare = {};  ///< before each run, not timed
+};
+
+/// Whether the contenders' results are right, and how that was seen.
+struct BenchCheck {
+  std::string text;
+  bool passed = false;
+};
+
+/// The seconds of one benchmark; without B where there is nothing to run it on.
+struct Comparison {
+  std::string name, unit;  ///< unit: of what `count` counts
+  std::uint64_t count = 0;
+  std::string a, b;
+  BenchCheck check;
+  std::vector<double> secondsA, secondsB;
+
+  double medianA() const, medianB() const;
+  /// secondsB / secondsA, pair by pair.
+  std::vector<double> ratios() const;
+};
+
+/// A figure that must be reached at the benchmark's own count; printed and reported, never a failure.
+struct Floor {
+  std::string text;
+  double value = 0, limit = 0;
+  bool atLeast = false;  ///< value ≥ limit is wanted, else value ≤ limit
+
+  bool reached() const { return atLeast ? value >= limit : value <= limit; }
+};
+
+double median(std::vector<double> values);
+
+class Bench {
+ public:
+  /// Opens the Vulkan device; without one the device's halves are left out, unless one was asked for by name: then it
+  /// throws MachineError. Throws InputError where the report cannot be written. Prints a heading.
+  Bench(const std::string& name, const BenchOptions& options, const CommonOptions& common);
+
+  std::uint64_t count() const { return options_.count; }
+  /// Null where there is none.
+  const Device* device() const { return gpu_ ? &gpu_->device() : nullptr; }
+
+  /// Runs both once, checks, and if that passes times them; prints. The result is null where the check failed; it is
+  /// valid until the next call.
+  const Comparison* compare(const std::string& name, const std::string& unit, const Contender& a,
+                            const std::optional<Contender>& b, const std::function<BenchCheck()>& check);
+
+  void addFloor(Floor floor) { floors_.push_back(std::move(floor)); }
+
+  /// Prints the floors and writes the report: 0, or 1 where a check failed. Throws MachineError for messages of the
+  /// validation layers.
+  int finish(std::uint64_t floorCount);
+
+ private:
+  std::string reportJson() const;
+
+  std::string name_;
+  BenchOptions options_;
+  std::unique_ptr<Gpu> gpu_;
+  std::vector<Comparison> comparisons_;
+  std::vector<Floor> floors_;
+};
+
+// Each runs one of `mote bench …`: lighting and octree, the bitonic sort, the splat pass.
+void benchLighting(Bench& bench);
+void benchSort(Bench& bench);
+void benchSplat(Bench& bench);
+
+}  // namespace mote

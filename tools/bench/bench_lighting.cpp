@@ -1,0 +1,142 @@
+// mote bench lighting: a noise cloud lit by one point light: build of the octree, then the optical depths on TBB and in
+// the compute shader.
+#include <tbb/parallel_sort.h>
+
+#include <cmath>
+
+#include "engine/passes/light_pass.h"
+#include "host/core/parallel.h"
+#include "host/core/random.h"
+#include "host/lighting/lighting.h"
+#include "host/lighting/medium.h"
+#include "host/octree/octree.h"
+#include "host/particles/generate.h"
+#include "host/particles/spacing.h"
+#include "tools/bench/bench.h"
+
+namespace mote {
+namespace {
+
+constexpr std::uint64_t kSeed = 0;
+constexpr double kOpticalDepth = 4;            // as the default of a scene
+constexpr double kRounding = 2e-5;             // |ΔT| that is left without a cutoff, as in mote crosscheck
+constexpr std::uint64_t kScalarMost = 20'000;  // particles lit on the scalar path too: a fraction of a second
+
+constexpr double kMostBuildSeconds = 0.2, kLeastRays = 1.0, kMostRatio = 12;  // the floors
+
+/// What buildOctree takes.
+struct Cloud {
+  std::vector<vec3> position;
+  std::vector<float> radius, peak;
+};
+
+Cloud makeCloud(std::uint64_t count, layout::uint falloff) {
+  ParticleSet set = generateParticles(Generator::Cloud, count, kSeed, 1);
+  Cloud cloud;
+  cloud.position = std::move(set.position);
+  cloud.radius.assign(count, static_cast<float>(kAutoRadiusFactor * meanNeighbourDistance(cloud.position)));
+  cloud.peak = peakOpticalDepths(set.density, cloud.radius, falloff, true, 1);
+  const Octree tree = buildOctree(cloud.position, cloud.radius, cloud.peak);
+  const auto scale = static_cast<float>(kOpticalDepth / meanLineOpticalDepth(tree, falloff));
+  for (float& peak : cloud.peak) peak *= scale;
+  return cloud;
+}
+
+/// Outside of the cloud, which lies within [-1, 1]³.
+layout::Light pointLight() {
+  return {.position = vec3(2, 3, 1),
+          .type = layout::kLightPoint,
+          .direction = vec3(0),
+          .decay = 2,
+          .power = vec3(60),
+          .shadowDensity = 1,
+          .castsShadows = 1};
+}
+
+/// The build, with the sort of as many numbers beside it: a yardstick of the machine's speed at that moment.
+Octree timeBuild(Bench& bench, const Cloud& cloud) {
+  std::vector<std::uint64_t> numbers;
+  Octree tree;
+  const Contender sort{.name = "tbb::parallel_sort of 64-bit numbers",
+                       .work = [&] { tbb::parallel_sort(numbers.begin(), numbers.end()); },
+                       .prepare =
+                           [&] {
+                             numbers.resize(cloud.position.size());
+                             for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = hashBits(kSeed, i);
+                           }};
+  const Contender build{.name = "octree build",
+                        .work = [&] { tree = buildOctree(cloud.position, cloud.radius, cloud.peak); },
+                        .prepare = [&] { tree = Octree(); }};
+  const Comparison* times = bench.compare("octree build", "particles", sort, build, [&]() -> BenchCheck {
+    const std::string broken = validate(tree, kDefaultParticlesPerCell);
+    return {broken.empty() ? "the tree keeps every promise of its layout" : broken, broken.empty()};
+  });
+  if (times)
+    bench.addFloor({"octree build [s per million particles]",
+                    times->medianB() / static_cast<double>(bench.count()) * 1e6, kMostBuildSeconds});
+  return tree;
+}
+
+/// The SIMD path against the scalar one on a smaller cloud, bit for bit.
+BenchCheck scalarCheck(std::uint64_t count, const layout::Light& light, const LightingOptions& options) {
+  const Cloud cloud = makeCloud(std::min(count, kScalarMost), options.falloff);
+  const Octree tree = buildOctree(cloud.position, cloud.radius, cloud.peak);
+  const bool same = opticalDepths(tree, light, options) == opticalDepthsScalar(tree, light, options);
+  return {fmt::format("SIMD {} the scalar path on {} particles", same ? "equals" : "is not", tree.particleCount()),
+          same};
+}
+
+BenchCheck deviceCheck(const std::vector<float>& host, const std::vector<float>& device, const layout::Light& light,
+                       const LightingOptions& options) {
+  const std::vector<float> a = transmittances(host, light), b = transmittances(device, light);
+  const double limit = std::max<double>(options.cutoff, kRounding);
+  double worst = 0, mean = 0;
+  std::size_t beyond = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double error = std::abs(double(a[i]) - double(b[i]));
+    worst = std::max(worst, error);
+    beyond += !(error <= limit);  // also where it is not a number, which max() passes over
+    mean += a[i] / static_cast<double>(a.size());
+  }
+  return {fmt::format("worst |ΔT| {:.1e} (limit {:.0e}, {} beyond), mean T {:.3f}", worst, limit, beyond, mean),
+          beyond == 0};
+}
+
+BenchCheck both(const BenchCheck& first, const BenchCheck& second) {
+  return {first.text + "; " + second.text, first.passed && second.passed};
+}
+
+void addFloors(Bench& bench, const Comparison& times) {
+  bench.addFloor(
+      {"lighting on TBB [M rays/s]", static_cast<double>(bench.count()) / times.medianA() * 1e-6, kLeastRays, true});
+  if (!times.secondsB.empty())
+    bench.addFloor({"lighting in compute / on TBB [time]", median(times.ratios()), kMostRatio});
+}
+
+}  // namespace
+
+void benchLighting(Bench& bench) {
+  const LightingOptions options;
+  const layout::Light light = pointLight();
+  const Octree tree = timeBuild(bench, makeCloud(bench.count(), options.falloff));
+
+  std::vector<float> onHost, onDevice;
+  const Contender host{"lighting on TBB", [&] { onHost = opticalDepths(tree, light, options); }};
+  const Device* device = bench.device();
+  const Comparison* times = nullptr;
+  if (device) {
+    LightPass pass(*device, options.falloff, options.endpoint);
+    pass.setTree(tree);
+    const Contender compute{"lighting in compute on the device",
+                            [&] { onDevice = pass.opticalDepths(light, options.cutoff); }};
+    times = bench.compare("lighting", "rays", host, compute, [&] {
+      return both(scalarCheck(bench.count(), light, options), deviceCheck(onHost, onDevice, light, options));
+    });
+  } else {
+    times = bench.compare("lighting", "rays", host, std::nullopt,
+                          [&] { return scalarCheck(bench.count(), light, options); });
+  }
+  if (times) addFloors(bench, *times);
+}
+
+}  // namespace mote
