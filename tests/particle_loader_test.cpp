@@ -14,7 +14,7 @@
 #include "host/particles/particle_loader.h"
 #include "host/particles/prt_writer.h"
 #include "host/particles/spacing.h"
-#include "support/temp_folder.h"
+#include "tests/support/temp_folder.h"
 
 namespace mote {
 namespace {

@@ -20,7 +20,7 @@
 #include "host/core/parallel.h"
 #include "host/particles/prt_reader.h"
 #include "host/particles/prt_writer.h"
-#include "support/temp_folder.h"
+#include "tests/support/temp_folder.h"
 
 namespace mote {
 namespace {

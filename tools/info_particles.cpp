@@ -193,11 +193,11 @@ void printChannel(const Json& channel) {
   const auto type = channel["type"].get<std::string>();
   constexpr std::size_t kShownComponents = 16;
   for (std::size_t c = 0; c < std::min(arity, kShownComponents); ++c)
-    fmt::print("  {:<20} {:<12} {:>14} {:>14} {:>14} {:>12}\n", c == 0 ? channel["name"].get<std::string>() : "",
+    fmt::print("  {:<23} {:<12} {:>14} {:>14} {:>14} {:>12}\n", c == 0 ? channel["name"].get<std::string>() : "",
                c > 0 ? "" : arity == 1 ? type : fmt::format("{} × {}", arity, type), valueText(channel["min"][c]),
                valueText(channel["mean"][c]), valueText(channel["max"][c]),
                c == 0 ? channel["not_finite"].dump() : "");
-  if (arity > kShownComponents) fmt::print("  {:<20} and {} more components\n", "", arity - kShownComponents);
+  if (arity > kShownComponents) fmt::print("  {:<23} and {} more components\n", "", arity - kShownComponents);
 }
 
 std::string pointText(const Json& point) {
@@ -237,17 +237,20 @@ void printParticles(const Json& info) {
   const auto size = info["bytes_per_particle"].get<std::size_t>();
   fmt::print("{}: {}, {} particles of {} bytes ({})\n", info["file"].get<std::string>(),
              info["format"].get<std::string>(), count, size, bytesText(static_cast<double>(count) * static_cast<double>(size)));
-  fmt::print("  {:<20} {:<12} {:>14} {:>14} {:>14} {:>12}\n", "channel", "type", "min", "mean", "max", "not finite");
+  fmt::print("  {:<23} {:<12} {:>14} {:>14} {:>14} {:>12}\n", "channel", "type", "min", "mean", "max", "not finite");
   for (const Json& channel : info["channels"]) printChannel(channel);
   if (info.contains("bounds"))
-    fmt::print("  {:<20} {} to {}\n", "bounds", pointText(info["bounds"]["min"]), pointText(info["bounds"]["max"]));
+    fmt::print("  {:<23} {} to {}\n", "bounds", pointText(info["bounds"]["min"]), pointText(info["bounds"]["max"]));
   const Json& radius = info["radius"];
-  fmt::print("  {:<20} {}\n", "radius", radius["from"].get<std::string>());
+  fmt::print("  {:<23} {}\n", "radius", radius["from"].get<std::string>());
   if (radius.contains("mean"))
-    fmt::print("  {:<20} {} to {}, mean {}\n", "", valueText(radius["min"]), valueText(radius["max"]), valueText(radius["mean"]));
+    fmt::print("  {:<23} {}\n", "", radius["min"] == radius["max"]
+                                          ? valueText(radius["min"])
+                                          : fmt::format("{} to {}, mean {}", valueText(radius["min"]),
+                                                        valueText(radius["max"]), valueText(radius["mean"])));
   for (const Json& entry : info["metadata"]) {
     const auto channel = entry["channel"].get<std::string>();
-    fmt::print("  {:<20} {}\n", (channel.empty() ? "" : channel + ".") + entry["name"].get<std::string>(), metadataText(entry));
+    fmt::print("  {:<23} {}\n", (channel.empty() ? "" : channel + ".") + entry["name"].get<std::string>(), metadataText(entry));
   }
 }
 

@@ -65,8 +65,9 @@ std::string aboutCommands(const CLI::App& app) {
   std::vector<std::string_view> names;
   for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
   const std::vector<std::string> left = app.remaining();
+  if (left.empty()) return "";
   const auto word = std::find_if(left.begin(), left.end(), [](const std::string& text) { return !text.starts_with('-'); });
-  if (word == left.end()) return "";
+  if (word == left.end()) return fmt::format("\"{}\" is no flag of mote, and a command is missing", left.front());
   return fmt::format("\"{}\" is no command of mote; the nearest is \"{}\"", *word, nearestWord(*word, names));
 }
 
@@ -91,7 +92,8 @@ int run(int argc, char** argv) {
   app.set_help_flag("-h,--help", "Print this help");
   app.require_subcommand(1);
   app.fallthrough();  // the subcommands, made after it, inherit it: common flags may follow them
-  app.footer("Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage, 3 the machine (device, memory, disk), "
+  app.footer("Any command also takes --threads, --device, --validate, -q and -v (mote --help).\n"
+             "Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage, 3 the machine (device, memory, disk), "
              "130 interrupted.");
   addCommonOptions(app, common);
   addCommands(app, common, exitCode);

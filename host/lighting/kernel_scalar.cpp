@@ -2,8 +2,8 @@
 // on vectors, and a test compares the bits.
 #include <cmath>
 
-#include "host/lighting/falloff.h"
 #include "host/lighting/kernel.h"
+#include "host/lighting/rules.h"
 
 namespace mote {
 namespace {

@@ -14,6 +14,7 @@
 #include <cmath>
 
 #include "host/core/vec.h"
+#include "host/core/falloff.h"
 #include "shaders/glsl/layout/splat.h"
 
 namespace mote {
@@ -31,13 +32,6 @@ struct Footprint {
   float opacity;  ///< factor on α: area ratio (r / r')²
   vec2 lo, hi;    ///< pixels that it can touch, clipped to the picture: upper left and lower right corner
 };
-
-/// F(q) = W(b) / W(0), q = b² / r² in [0, 1).
-inline float falloff(float q, layout::uint kind) {
-  if (kind == layout::kFalloffLinear) return 1.0f - std::sqrt(q);
-  if (kind == layout::kFalloffSphere) return std::sqrt(1.0f - q);
-  return (1.0f - q) * (1.0f - q);
-}
 
 /// 1 − e^(−x) for x ≥ 0, to a relative error of 3e-7 also where x is tiny: a million thin particles must add up.
 /// x = n·ln 2 − y with |y| ≤ ½·ln 2; with p = e^y − 1 (Taylor to y⁷, remainder < 1e-8) the value is (1 − 2⁻ⁿ) − 2⁻ⁿ·p,

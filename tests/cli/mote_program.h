@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "support/process.h"
-#include "support/temp_folder.h"
+#include "tests/support/process.h"
+#include "tests/support/temp_folder.h"
 
 namespace mote::test {
 

@@ -1,13 +1,13 @@
-// Falloff of the optical depth (DESIGN §2): F(q) = W(b) / W(0) with q = b² / r² in [0, 1).
-// C++ twin: falloff() in host/splat/footprint.h, operation by operation.
+// Falloff of the optical depth (DESIGN §2): F(q) = W(b) / W(0), q = b² / r² ≥ 0; 0 for q ≥ 1.
+// C++ twin: host/core/falloff.h, operation by operation.
 #ifndef MOTE_LIB_FALLOFF_GLSL
 #define MOTE_LIB_FALLOFF_GLSL
 #include "../layout/medium.h"
 
 float falloff(float q, uint kind) {
-  if (kind == kFalloffLinear) return 1.0 - sqrt(q);
-  if (kind == kFalloffSphere) return sqrt(1.0 - q);
-  return (1.0 - q) * (1.0 - q);
+  if (kind == kFalloffLinear) return max(1.0 - sqrt(q), 0.0);
+  const float u = max(1.0 - q, 0.0);
+  return kind == kFalloffSphere ? sqrt(u) : u * u;
 }
 
 #endif

@@ -121,12 +121,12 @@ void main() {
         float share;
         if (kEndpoint == kEndpointClamp) {
           const vec3 e = d - clamp(t, -before[k], after[k]) * direction[k];
-          share = falloff(min(dot(e, e) * inverseSquare, 1.0), kFalloff);
+          share = falloff(dot(e, e) * inverseSquare, kFalloff);
         } else {
           const vec3 e = d - t * direction[k];
           const float q = dot(e, e) * inverseSquare;
           const float halfChord = particle.w * sqrt(max(1.0 - q, 0.0));
-          share = falloff(min(q, 1.0), kFalloff) * cap(before[k] + t, halfChord) * cap(after[k] - t, halfChord);
+          share = falloff(q, kFalloff) * cap(before[k] + t, halfChord) * cap(after[k] - t, halfChord);
         }
         depth[k] += slot == self[k] ? 0.0 : peak * share;
       }

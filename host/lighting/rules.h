@@ -1,22 +1,13 @@
-// Falloff and end cap of a particle's optical depth (DESIGN §2), in single precision as all kernels compute them.
-// The GLSL twin is shaders/glsl/lib/falloff.glsl.
+// The share of a particle that lies before a ray's end, and the choice of a kernel by the medium's rules (DESIGN §2).
 #pragma once
 #include <algorithm>
 #include <cmath>
 
 #include "host/core/error.h"
+#include "host/core/falloff.h"
 #include "shaders/glsl/layout/medium.h"
 
 namespace mote {
-
-/// F(q), q = b²/r² ≥ 0; 0 for q ≥ 1.
-template <layout::uint kFalloff>
-inline float falloff(float q) {
-  if constexpr (kFalloff == layout::kFalloffLinear) return std::max(1.0f - std::sqrt(q), 0.0f);
-  const float u = std::max(1.0f - q, 0.0f);
-  if constexpr (kFalloff == layout::kFalloffSphere) return std::sqrt(u);
-  return u * u;
-}
 
 /// Share of a particle with half chord c that lies on the positive side of a point at distance t before its middle:
 /// 0 for t ≤ −c, ½ + ¾x − ¼x³ with x = t/c, 1 for t ≥ c.
