@@ -46,7 +46,8 @@ void printDifference(const ImageDifference& d) {
              std::isfinite(d.psnr) ? fmt::format("{:.1f} dB", d.psnr) : "infinite (no difference)", 100 * d.within);
 }
 
-std::string reportJson(const ImageDifference& difference, const CompareOptions& options, const std::vector<std::string>& failed) {
+std::string reportJson(const ImageDifference& difference, const CompareOptions& options,
+                       const std::vector<std::string>& failed) {
   nlohmann::ordered_json json = nlohmann::ordered_json::parse(differenceJson(difference));
   json["first"] = options.first, json["second"] = options.second;
   json["limits"] = {{"rmse", options.maxRmse}, {"within", options.minWithin}};
@@ -55,8 +56,15 @@ std::string reportJson(const ImageDifference& difference, const CompareOptions& 
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
+void checkLimits(const CompareOptions& options) {
+  if (!(options.maxRmse >= 0)) throw InputError("--max-rmse", "", "a number ≥ 0", fmt::format("{}", options.maxRmse));
+  if (!(options.minWithin >= 0 && options.minWithin <= 1))
+    throw InputError("--within", "", "a share from 0 to 1", fmt::format("{}", options.minWithin));
+}
+
 /// Returns whether the pictures are as alike as they must be.
 bool compare(const CompareOptions& options) {
+  checkLimits(options);
   for (const std::string& path : {options.report, options.diff})
     if (!path.empty()) const OutputFile probe(path);  // so that a bad name leaves nothing half done
   const Image first = readExr(options.first), second = readExr(options.second);
@@ -76,19 +84,18 @@ bool compare(const CompareOptions& options) {
 
 void addCompareCommand(CLI::App& app, const CommonOptions&, int& exitCode) {
   auto options = std::make_shared<CompareOptions>();
-  CLI::App* command = app.add_subcommand("compare", "Measure how far two pictures are apart; exit 1 where it is too far");
+  CLI::App* command =
+      app.add_subcommand("compare", "Measure how far two pictures are apart; exit 1 where it is too far");
   command->add_option("first", options->first, "OpenEXR picture")->required()->type_name("A.exr");
   command->add_option("second", options->second, "OpenEXR picture of the same size")->required()->type_name("B.exr");
   command->add_option("--report", options->report, "Write the differences as JSON")->type_name("OUT.json");
   command->add_option("--diff", options->diff, "Write 64 × the difference as a picture")->type_name("OUT.png");
   command->add_option("--max-rmse", options->maxRmse, "Greatest RMSE that passes; 1e-3, crosscheck's, by default")
-      ->type_name("X")
-      ->check(CLI::NonNegativeNumber.description(""));
+      ->type_name("X");
   command
       ->add_option("--within", options->minWithin,
                    "Least share of pixels that differ by at most 2/255; 0.999, crosscheck's, by default")
-      ->type_name("SHARE")
-      ->check(CLI::Range(0.0, 1.0).description(""));
+      ->type_name("SHARE");
   command->callback([options, &exitCode] { exitCode = compare(*options) ? 0 : 1; });
 }
 

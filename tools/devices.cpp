@@ -26,9 +26,14 @@ void printJson(const std::vector<DeviceReport>& reports) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (std::size_t i = 0; i < reports.size(); ++i) {
     const DeviceReport& r = reports[i];
-    list.push_back({{"number", i},         {"name", r.name},     {"type", r.type},
-                    {"vulkan", r.apiVersion}, {"driver", r.driver}, {"memory", r.memory},
-                    {"usable", r.missing.empty()}, {"missing", r.missing}});
+    list.push_back({{"number", i},
+                    {"name", r.name},
+                    {"type", r.type},
+                    {"vulkan", r.apiVersion},
+                    {"driver", r.driver},
+                    {"memory", r.memory},
+                    {"usable", r.missing.empty()},
+                    {"missing", r.missing}});
   }
   fmt::print("{}\n", list.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }

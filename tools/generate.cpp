@@ -39,7 +39,8 @@ double factorOf(std::string_view suffix) {
 std::uint64_t parseCount(const std::string& text) {
   double number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  const double count = number * factorOf(std::string_view(end, static_cast<std::size_t>(text.data() + text.size() - end)));
+  const double count =
+      number * factorOf(std::string_view(end, static_cast<std::size_t>(text.data() + text.size() - end)));
   // 1.1M is 1100000.0000000002 in double; what is meant is the whole number beside it.
   const double whole = std::round(count);
   const bool isWhole = std::abs(count - whole) <= 1e-9 * whole;
@@ -52,7 +53,8 @@ std::uint64_t parseCount(const std::string& text) {
 /// Everything that can be wrong with the outputs, before the first particle is made.
 void checkOutput(const std::string& pattern, const FrameRange& frames) {
   if (std::filesystem::path(pattern).extension() != ".prt")
-    throw InputError("--output", "", "a name that ends in .prt", "\"" + pattern + "\"", "generate writes PRT files only");
+    throw InputError("--output", "", "a name that ends in .prt", "\"" + pattern + "\"",
+                     "generate writes PRT files only");
   if (frames.first + frames.step <= frames.last && !hasFramePattern(pattern))
     throw InputError("--output", "", "a name with #### for the frame number, because there are several frames",
                      "\"" + pattern + "\"", "for example plume.####.prt");
@@ -69,7 +71,8 @@ std::string uint32Bytes(std::initializer_list<std::uint32_t> values) {
 std::vector<PrtMetadata> metadataOf(const GenerateOptions& options, std::uint64_t count, int frame) {
   constexpr std::int32_t kRightHandedYUp = 1, kPoint = 1, kVector = 2, kScalar = 6;
   return {PrtMetadata::int32("", "CoordSys", kRightHandedYUp),
-          {"", "FrameRate", static_cast<std::int32_t>(PrtType::U32), uint32Bytes({static_cast<std::uint32_t>(kGeneratorFps), 1})},
+          {"", "FrameRate", static_cast<std::int32_t>(PrtType::U32),
+           uint32Bytes({static_cast<std::uint32_t>(kGeneratorFps), 1})},
           PrtMetadata::text("", "Generator",
                             fmt::format("mote {} generate {} --count {} --seed {} --frames {}", MOTE_VERSION,
                                         options.kind, count, options.seed, frame)),
@@ -103,9 +106,16 @@ void addGenerateCommand(CLI::App& app, const CommonOptions&, int&) {
       ->required()
       ->type_name("KIND")
       ->check(CLI::IsMember({"cloud", "plume", "ball"}).description(""));
-  command->add_option("--count", options->count, "Number of particles: 350000, 350k, 9M or 9e6")->required()->type_name("N");
-  command->add_option("--seed", options->seed, "Same seed, same particles; 0 by default")->type_name("S");
-  command->add_option("--frames", options->frames, "Frames A-B, or A-BxS for every S-th; 1 by default")->type_name("A-B[xS]");
+  command->add_option("--count", options->count, "Number of particles: 350000, 350k, 9M or 9e6")
+      ->required()
+      ->type_name("N");
+  command->add_option("--seed", options->seed, "Same seed, same particles; 0 by default")
+      ->type_name("S")
+      ->check([](const std::string& text) {  // CLI11 itself takes -1 for 2^64 - 1
+        return text.find('-') == std::string::npos ? "" : "expected a whole number from 0 to 2^64 - 1, got " + text;
+      });
+  command->add_option("--frames", options->frames, "Frames A-B, or A-BxS for every S-th; 1 by default")
+      ->type_name("A-B[xS]");
   command->add_option("-o,--output", options->output, "PRT file to write; #### is the frame number")
       ->required()
       ->type_name("OUT.prt");

@@ -63,9 +63,10 @@ Json describePicture(const std::string& path) {
   std::size_t notFinite = 0;
   for (const vec4& p : image.pixels) notFinite += !std::isfinite(p.r + p.g + p.b + p.a);
   Json channels = Json::array(), attributes = Json::object();
-  for (const ExrChannel& channel : exrChannels(path)) channels.push_back({{"name", channel.name}, {"type", channel.type}});
+  for (const ExrChannel& channel : exrChannels(path))
+    channels.push_back({{"name", channel.name}, {"type", channel.type}});
   for (const auto& [name, value] : exrStrings(path)) attributes[name] = value;
-  return {{"file", path},         {"kind", "picture"},       {"width", image.width},      {"height", image.height},
+  return {{"file", path},         {"kind", "picture"},       {"width", image.width},    {"height", image.height},
           {"channels", channels}, {"not_finite", notFinite}, {"attributes", attributes}};
 }
 
@@ -98,7 +99,9 @@ void addInfoCommand(CLI::App& app, const CommonOptions&, int&) {
   };
   auto options = std::make_shared<InfoOptions>();
   CLI::App* command = app.add_subcommand("info", "Say what particle files, pictures and scenes hold");
-  command->add_option("files", options->files, "PRT files, OpenEXR pictures, scenes (.json)")->required()->type_name("FILE");
+  command->add_option("files", options->files, "PRT files, OpenEXR pictures, scenes (.json)")
+      ->required()
+      ->type_name("FILE");
   command->add_flag("--json", options->json, "Print one JSON object a file, each on a line of its own");
   command->callback([options] { info(options->files, options->json); });
 }

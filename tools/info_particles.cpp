@@ -170,15 +170,20 @@ Json autoRadius(const PrtReader& file) {
   std::vector<vec3> positions;
   const PrtRequest request{"Position", &positions};
   file.read({&request, 1});
-  std::erase_if(positions, [](const vec3& p) { return !(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)); });
+  std::erase_if(positions,
+                [](const vec3& p) { return !(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)); });
   const double radius = kAutoRadiusFactor * meanNeighbourDistance(positions);
   if (!(radius > 0)) return {{"from", "none: there is no spacing to take it from"}};
-  return {{"from", "auto: 1.5 × the mean distance to the nearest 8"}, {"min", radius}, {"mean", radius}, {"max", radius}};
+  return {
+      {"from", "auto: 1.5 × the mean distance to the nearest 8"}, {"min", radius}, {"mean", radius}, {"max", radius}};
 }
 
 Json radiusJson(const PrtReader& file, const Json& channels) {
   if (const Json* radius = channelNamed(channels, "Radius"))
-    return {{"from", "channel Radius"}, {"min", (*radius)["min"][0]}, {"mean", (*radius)["mean"][0]}, {"max", (*radius)["max"][0]}};
+    return {{"from", "channel Radius"},
+            {"min", (*radius)["min"][0]},
+            {"mean", (*radius)["mean"][0]},
+            {"max", (*radius)["max"][0]}};
   const PrtChannel* position = file.header().channel("Position");
   if (!position || position->arity < 3) return {{"from", "none: there is no Position of arity 3"}};
   return autoRadius(file);
@@ -194,8 +199,10 @@ void printChannel(const Json& channel) {
   constexpr std::size_t kShownComponents = 16;
   for (std::size_t c = 0; c < std::min(arity, kShownComponents); ++c)
     fmt::print("  {:<23} {:<12} {:>14} {:>14} {:>14} {:>12}\n", c == 0 ? channel["name"].get<std::string>() : "",
-               c > 0 ? "" : arity == 1 ? type : fmt::format("{} × {}", arity, type), valueText(channel["min"][c]),
-               valueText(channel["mean"][c]), valueText(channel["max"][c]),
+               c > 0        ? ""
+               : arity == 1 ? type
+                            : fmt::format("{} × {}", arity, type),
+               valueText(channel["min"][c]), valueText(channel["mean"][c]), valueText(channel["max"][c]),
                c == 0 ? channel["not_finite"].dump() : "");
   if (arity > kShownComponents) fmt::print("  {:<23} and {} more components\n", "", arity - kShownComponents);
 }
@@ -236,7 +243,8 @@ void printParticles(const Json& info) {
   const auto count = info["count"].get<std::uint64_t>();
   const auto size = info["bytes_per_particle"].get<std::size_t>();
   fmt::print("{}: {}, {} particles of {} bytes ({})\n", info["file"].get<std::string>(),
-             info["format"].get<std::string>(), count, size, bytesText(static_cast<double>(count) * static_cast<double>(size)));
+             info["format"].get<std::string>(), count, size,
+             bytesText(static_cast<double>(count) * static_cast<double>(size)));
   fmt::print("  {:<23} {:<12} {:>14} {:>14} {:>14} {:>12}\n", "channel", "type", "min", "mean", "max", "not finite");
   for (const Json& channel : info["channels"]) printChannel(channel);
   if (info.contains("bounds"))
@@ -244,13 +252,14 @@ void printParticles(const Json& info) {
   const Json& radius = info["radius"];
   fmt::print("  {:<23} {}\n", "radius", radius["from"].get<std::string>());
   if (radius.contains("mean"))
-    fmt::print("  {:<23} {}\n", "", radius["min"] == radius["max"]
-                                          ? valueText(radius["min"])
-                                          : fmt::format("{} to {}, mean {}", valueText(radius["min"]),
-                                                        valueText(radius["max"]), valueText(radius["mean"])));
+    fmt::print("  {:<23} {}\n", "",
+               radius["min"] == radius["max"] ? valueText(radius["min"])
+                                              : fmt::format("{} to {}, mean {}", valueText(radius["min"]),
+                                                            valueText(radius["max"]), valueText(radius["mean"])));
   for (const Json& entry : info["metadata"]) {
     const auto channel = entry["channel"].get<std::string>();
-    fmt::print("  {:<23} {}\n", (channel.empty() ? "" : channel + ".") + entry["name"].get<std::string>(), metadataText(entry));
+    fmt::print("  {:<23} {}\n", fmt::format("{}{}{}", channel, channel.empty() ? "" : ".", entry["name"].get<std::string>()),
+               metadataText(entry));
   }
 }
 

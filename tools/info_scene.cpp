@@ -60,11 +60,13 @@ SourceFacts fileFacts(const ParticleSource& source, int frame) {
 
 SourceFacts factsOf(const ParticleSource& source, int frame) {
   if (!source.file.empty()) return fileFacts(source, frame);
-  return {source.count, nameOf(source.generate), radiusText(source, true), false, source.generate == Generator::Plume, true};
+  return {source.count, nameOf(source.generate), radiusText(source, true), false, source.generate == Generator::Plume,
+          true};
 }
 
-/// Bytes that the stages of one frame hold at their peak. Everything that grows with the particles or the picture is
-/// counted; what a driver, the program itself and reading ahead take is not.
+/// Bytes that the stages of one frame hold at their peak: what grows with the particles or the picture, and the program
+/// itself. Within 15 % of the peaks measured on the host for 10⁵ to 4·10⁶ particles; the plume's generator (200 MB for
+/// its flow) and a driver come on top.
 struct MemoryNeed {
   double host = 0, device = 0;
 };
@@ -72,18 +74,23 @@ struct MemoryNeed {
 MemoryNeed memoryNeed(double particles, const std::vector<SourceFacts>& sources, const Scene& scene) {
   // Particles a cell × nodes a particle: between 2 and 7, by how the particles fall into the cells; measured for the
   // three generators, 10⁴ to 10⁶ particles, 8 to 128 a cell.
-  const double perCell = scene.lighting.particlesPerCell > 0 ? scene.lighting.particlesPerCell : kDefaultParticlesPerCell;
+  const double perCell =
+      scene.lighting.particlesPerCell > 0 ? scene.lighting.particlesPerCell : kDefaultParticlesPerCell;
   const double nodes = std::min(2.0, 4 / perCell) * sizeof(layout::Node);
-  const auto any = [&](bool SourceFacts::*has) { return std::any_of(sources.begin(), sources.end(), [&](const SourceFacts& s) { return s.*has; }); };
-  const double set = 12 + 4 + 4 + 12 * any(&SourceFacts::color) + 12 * any(&SourceFacts::velocity) + 8 * any(&SourceFacts::id);
-  constexpr double kTree = 6 * 4;                                   // x, y, z, radius, peak, source
-  constexpr double kDraw = sizeof(layout::SplatParticle) + 12;      // with radiance, or with (key, index) and order
-  constexpr double kLightDevice = 16 + 4 + 4 + 4;                   // position and radius, peak, order, optical depth
+  const auto any = [&](bool SourceFacts::*has) {
+    return std::any_of(sources.begin(), sources.end(), [&](const SourceFacts& s) { return s.*has; });
+  };
+  const double set =
+      12 + 4 + 4 + 12 * any(&SourceFacts::color) + 12 * any(&SourceFacts::velocity) + 8 * any(&SourceFacts::id);
+  constexpr double kTree = 6 * 4;                               // x, y, z, radius, peak, source
+  constexpr double kDraw = sizeof(layout::SplatParticle) + 12;  // with radiance, or with (key, index) and order
+  constexpr double kLightDevice = 16 + 4 + 4 + 4;               // position and radius, peak, order, optical depth
   constexpr double kDrawDevice = sizeof(layout::SplatParticle) + sizeof(layout::SortPair) + 4;
   const double depth = scene.output.depth ? 4 : 0;
   const double pixels = double(scene.output.size.x) * scene.output.size.y;
+  constexpr double kProgram = 20e6;  // code, libraries, threads
   const double half = scene.output.precision == Precision::Half ? 8 : 0;
-  return {.host = particles * (set + kTree + nodes + kDraw) + pixels * (16 + depth + half),
+  return {.host = kProgram + particles * (set + kTree + nodes + kDraw) + pixels * (16 + depth + half),
           .device = std::max(particles * (nodes + kLightDevice), particles * kDrawDevice + pixels * (16 + depth))};
 }
 
@@ -124,7 +131,8 @@ Json describeScene(const std::string& path) {
                        {"radius", facts.back().radius}});
   }
   const Json lights = lightsJson(scene);
-  const auto shadows = std::count_if(lights.begin(), lights.end(), [](const Json& l) { return l["casts_shadows"] == true; });
+  const auto shadows =
+      std::count_if(lights.begin(), lights.end(), [](const Json& l) { return l["casts_shadows"] == true; });
   const double count = static_cast<double>(particles), rays = count * static_cast<double>(shadows);
   const MemoryNeed need = memoryNeed(count, facts, scene);
   return {{"file", path},
@@ -154,8 +162,10 @@ void printScene(const Json& info) {
   }
   const Json &frames = info["frames"], &estimate = info["estimate"];
   row("lights", listed(info["lights"]));
-  row("picture", fmt::format("{} × {}, {}", info["size"][0].get<int>(), info["size"][1].get<int>(), info["output"].get<std::string>()));
-  row("frames", fmt::format("{} to {}, every {}", frames["first"].get<int>(), frames["last"].get<int>(), frames["step"].get<int>()));
+  row("picture", fmt::format("{} × {}, {}", info["size"][0].get<int>(), info["size"][1].get<int>(),
+                             info["output"].get<std::string>()));
+  row("frames", fmt::format("{} to {}, every {}", frames["first"].get<int>(), frames["last"].get<int>(),
+                            frames["step"].get<int>()));
   row("memory", fmt::format("about {}; on a Vulkan device about {}", bytesText(estimate["host_bytes"].get<double>()),
                             bytesText(estimate["device_bytes"].get<double>())));
   row("work", fmt::format("{:.0f} rays a frame, about {:.2g} s with {} threads", estimate["rays"].get<double>(),

@@ -31,7 +31,8 @@ void addCommonOptions(CLI::App& app, CommonOptions& common) {
       ->check(CLI::Range(0, kMaxThreads).description(""));
   app.add_option("--device", common.device, "Vulkan device, by its number or a part of its name (see mote devices)")
       ->type_name("N|NAME");
-  app.add_flag("--validate", common.validate, "Turn the Vulkan validation layers on; any message of theirs is a failure");
+  app.add_flag("--validate", common.validate,
+               "Turn the Vulkan validation layers on; any message of theirs is a failure");
   CLI::Option* quiet = app.add_flag("-q,--quiet", common.quiet, "Print nothing but errors to stderr");
   app.add_flag("-v,--verbose", common.verbose, "Print more to stderr")->excludes(quiet);
 }
@@ -66,7 +67,8 @@ std::string aboutCommands(const CLI::App& app) {
   for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
   const std::vector<std::string> left = app.remaining();
   if (left.empty()) return "";
-  const auto word = std::find_if(left.begin(), left.end(), [](const std::string& text) { return !text.starts_with('-'); });
+  const auto word =
+      std::find_if(left.begin(), left.end(), [](const std::string& text) { return !text.starts_with('-'); });
   if (word == left.end()) return fmt::format("\"{}\" is no flag of mote, and a command is missing", left.front());
   return fmt::format("\"{}\" is no command of mote; the nearest is \"{}\"", *word, nearestWord(*word, names));
 }
@@ -92,9 +94,10 @@ int run(int argc, char** argv) {
   app.set_help_flag("-h,--help", "Print this help");
   app.require_subcommand(1);
   app.fallthrough();  // the subcommands, made after it, inherit it: common flags may follow them
-  app.footer("Any command also takes --threads, --device, --validate, -q and -v (mote --help).\n"
-             "Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage, 3 the machine (device, memory, disk), "
-             "130 interrupted.");
+  app.footer(
+      "Any command also takes --threads, --device, --validate, -q and -v (mote --help).\n"
+      "Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage, 3 the machine (device, memory, disk), "
+      "130 interrupted.");
   addCommonOptions(app, common);
   addCommands(app, common, exitCode);
 
@@ -133,7 +136,8 @@ int main(int argc, char** argv) {
   } catch (const MachineError& error) {
     exitCode = report(error.what(), kMachine);
   } catch (const std::bad_alloc&) {
-    exitCode = report("memory ran out; fewer particles or a smaller picture need less (mote info SCENE says how much)", kMachine);
+    exitCode = report("memory ran out; fewer particles or a smaller picture need less (mote info SCENE says how much)",
+                      kMachine);
   } catch (const std::exception& error) {
     exitCode = report(fmt::format("internal error, a bug in mote: {}", error.what()).c_str(), kMachine);
   }

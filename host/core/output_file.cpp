@@ -84,7 +84,8 @@ OutputFile::~OutputFile() {
 
 void OutputFile::commit() {
   const int handle = ::open(temporary_.c_str(), O_RDONLY | O_CLOEXEC);
-  if (handle < 0) throw MachineError(fmt::format("{}: cannot reopen what was written: {}", path_, std::strerror(errno)));
+  if (handle < 0)
+    throw MachineError(fmt::format("{}: cannot reopen what was written: {}", path_, std::strerror(errno)));
   const int synced = ::fsync(handle);
   const int why = errno;
   ::close(handle);

@@ -11,9 +11,11 @@
 namespace mote::test {
 
 /// A driver file that does not exist: a machine without Vulkan.
-inline const ProcessOptions kWithoutVulkan{.environment = {{"VK_ICD_FILENAMES", "/nonexistent"}, {"VK_DRIVER_FILES", "/nonexistent"}}};
-inline const ProcessOptions kOnLavapipe{.environment = {{"VK_ICD_FILENAMES", "/usr/share/vulkan/icd.d/lvp_icd.x86_64.json"},
-                                                        {"VK_DRIVER_FILES", "/usr/share/vulkan/icd.d/lvp_icd.x86_64.json"}}};
+inline const ProcessOptions kWithoutVulkan{
+    .environment = {{"VK_ICD_FILENAMES", "/nonexistent"}, {"VK_DRIVER_FILES", "/nonexistent"}}};
+inline const ProcessOptions kOnLavapipe{
+    .environment = {{"VK_ICD_FILENAMES", "/usr/share/vulkan/icd.d/lvp_icd.x86_64.json"},
+                    {"VK_DRIVER_FILES", "/usr/share/vulkan/icd.d/lvp_icd.x86_64.json"}}};
 
 /// Runs `mote` with these arguments.
 inline ProcessResult mote(std::vector<std::string> arguments, const ProcessOptions& options = {}) {

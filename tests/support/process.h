@@ -24,7 +24,7 @@ struct ProcessOptions {
   std::optional<rlim_t> largestFile = {};               ///< RLIMIT_FSIZE [bytes]: a disk that is full
   std::string outputFile = {};                          ///< stdout goes there instead of into the result
   int signal = SIGINT;
-  std::function<bool()> signalWhen = {};                ///< asked every few milliseconds; `signal` is sent once it is true
+  std::function<bool()> signalWhen = {};  ///< asked every few milliseconds; `signal` is sent once it is true
 };
 
 struct ProcessResult {
@@ -53,7 +53,8 @@ inline std::vector<std::string> environmentWith(const std::map<std::string, std:
 }
 
 /// Only what may be called between fork and execve.
-[[noreturn]] inline void becomeProgram(char** arguments, char** environment, int out, int err, const ProcessOptions& options) {
+[[noreturn]] inline void becomeProgram(char** arguments, char** environment, int out, int err,
+                                       const ProcessOptions& options) {
   if (!options.outputFile.empty()) out = ::open(options.outputFile.c_str(), O_WRONLY);
   ::dup2(::open("/dev/null", O_RDONLY), STDIN_FILENO);
   ::dup2(out, STDOUT_FILENO);
