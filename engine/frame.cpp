@@ -95,9 +95,9 @@ Frame prepareFrame(Scene& scene, int number, FrameStats& stats) {
   frame.tree = buildTree(frame.particles, scene, frame.rules.falloff);
   settle(scene, frame.particles, frame.tree, frame.rules.falloff);
   scaleDensity(frame.tree, scene.medium.densityScale);
-  frame.view = makeSplatCamera(scene.camera.position, scene.camera.target, scene.camera.up, scene.camera.fov,
-                               scene.camera.near, scene.camera.far, scene.output.size.x, scene.output.size.y,
-                               frame.rules.falloff);
+  frame.view =
+      makeSplatCamera(scene.camera.position, scene.camera.target, scene.camera.up, scene.camera.fov, scene.camera.near,
+                      scene.camera.far, scene.output.size.x, scene.output.size.y, frame.rules.falloff);
   for (const LightSource& light : scene.lights) {
     frame.lights.push_back(toLight(light));
     frame.lightNames.push_back(light.name);

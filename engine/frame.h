@@ -15,12 +15,12 @@ namespace mote {
 
 struct Frame {
   int number = 1;
-  ParticleSet particles;              ///< in input order; tree.source maps slots to it
+  ParticleSet particles;  ///< in input order; tree.source maps slots to it
   Octree tree;
   std::vector<layout::Light> lights;
   std::vector<std::string> lightNames;
-  layout::SplatCamera view;           ///< the camera as the splats take it
-  LightingOptions rules;              ///< falloff, endpoint, cutoff
+  layout::SplatCamera view;  ///< the camera as the splats take it
+  LightingOptions rules;     ///< falloff, endpoint, cutoff
 };
 
 /// Loads and builds; fills `stats` (counts, radius, density scale, inputs, seconds of load and octree).

@@ -16,9 +16,9 @@ struct Backends {
   bool anyGpu() const { return gpuLighting || gpuRaster; }
 };
 
-/// Backend::Auto becomes the device if there is one that is not a CPU itself: there TBB is faster (docs/performance.md).
-/// Opens the device where it may be needed; `gpu` stays null where none is used. Says once, on stderr, where the work is
-/// done. Throws MachineError when Gpu is asked for and there is no usable device.
+/// Backend::Auto becomes the device if there is one that is not a CPU itself: there TBB is faster
+/// (docs/performance.md). Opens the device where it may be needed; `gpu` stays null where none is used. Says once, on
+/// stderr, where the work is done. Throws MachineError when Gpu is asked for and there is no usable device.
 Backends chooseBackends(Backend lighting, Backend raster, const DeviceOptions& options, std::unique_ptr<Gpu>& gpu);
 
 class Renderer {

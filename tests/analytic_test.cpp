@@ -15,13 +15,23 @@ namespace {
 constexpr layout::uint kFalloffs[] = {layout::kFalloffSmooth, layout::kFalloffLinear, layout::kFalloffSphere};
 
 layout::Light sunlight() {
-  return {.position = {}, .type = layout::kLightDirectional, .direction = {0, 0, -1}, .decay = 0, .power = vec3(1),
-          .shadowDensity = 1, .castsShadows = 1};
+  return {.position = {},
+          .type = layout::kLightDirectional,
+          .direction = {0, 0, -1},
+          .decay = 0,
+          .power = vec3(1),
+          .shadowDensity = 1,
+          .castsShadows = 1};
 }
 
 layout::Light lamp(const vec3& position) {
-  return {.position = position, .type = layout::kLightPoint, .direction = {0, 0, -1}, .decay = 2, .power = vec3(1),
-          .shadowDensity = 1, .castsShadows = 1};
+  return {.position = position,
+          .type = layout::kLightPoint,
+          .direction = {0, 0, -1},
+          .decay = 2,
+          .power = vec3(1),
+          .shadowDensity = 1,
+          .castsShadows = 1};
 }
 
 /// Equal particles: support radius, and cross-section that gives the peak.
@@ -132,11 +142,13 @@ void checkSlab(std::size_t count, double radiusInSpacings, int realisations) {
       }
       const std::vector<vec3> directions(points.size(), vec3(0, 0, 1));
       double sum = 0;
-      for (const float depth : lineOpticalDepths(treeOf(position, kind), points, directions, falloff)) sum += std::exp(-depth);
+      for (const float depth : lineOpticalDepths(treeOf(position, kind), points, directions, falloff))
+        sum += std::exp(-depth);
       means.push_back(sum / static_cast<double>(points.size()));
     }
     const double expected = std::pow(1 - blocked / kArea, static_cast<double>(count));
-    expectMean(means, expected, fmt::format("slab, {} particles, r = {} spacings, falloff {}", count, radiusInSpacings, falloff));
+    expectMean(means, expected,
+               fmt::format("slab, {} particles, r = {} spacings, falloff {}", count, radiusInSpacings, falloff));
     EXPECT_NEAR(expected, std::exp(-static_cast<double>(count) / kArea * blocked), 0.001);
   }
 }
@@ -181,7 +193,8 @@ void checkBall(std::size_t count, double radiusInSpacings, int realisations) {
   for (int k = 0; k < realisations; ++k) {
     std::vector<vec3> position = uniformBall(count, 300 + k);
     position.insert(position.end(), probes.begin(), probes.end());
-    std::vector<float> radius(position.size(), static_cast<float>(kind.radius)), peak(count, static_cast<float>(kind.peak()));
+    std::vector<float> radius(position.size(), static_cast<float>(kind.radius)),
+        peak(count, static_cast<float>(kind.peak()));
     peak.resize(position.size(), 0.0f);
     const Octree tree = buildOctree(position, radius, peak);
     const std::vector<float> depths = opticalDepths(tree, sunlight(), {falloff, layout::kEndpointSoft, 0});
@@ -190,7 +203,8 @@ void checkBall(std::size_t count, double radiusInSpacings, int realisations) {
       if (tree.source[slot] >= count) sum += std::exp(-depths[slot]);
     means.push_back(sum / kProbes);
   }
-  expectMean(means, expected, fmt::format("ball, {} particles, r = {} spacings, falloff {}", count, radiusInSpacings, falloff));
+  expectMean(means, expected,
+             fmt::format("ball, {} particles, r = {} spacings, falloff {}", count, radiusInSpacings, falloff));
 }
 
 TEST(Analytic, BallOfTenThousandHasTheExpectedTransmittance) {
@@ -222,7 +236,8 @@ TEST(Analytic, ThinParticlesGiveBeersLaw) {
     }
     const std::vector<vec3> directions(points.size(), vec3(0, 0, 1));
     double sum = 0;
-    for (const float depth : lineOpticalDepths(treeOf(position, kind), points, directions, kind.falloff)) sum += std::exp(-depth);
+    for (const float depth : lineOpticalDepths(treeOf(position, kind), points, directions, kind.falloff))
+      sum += std::exp(-depth);
     logs.push_back(sum / static_cast<double>(points.size()));
   }
   const Estimate e = estimate(logs);
@@ -242,7 +257,8 @@ TEST(Analytic, TransmittanceOfAPathIsTheProductOfItsParts) {
     std::vector<vec3> position = cloud;
     position.push_back(start);
     position.push_back(middle);
-    std::vector<float> radius(position.size(), static_cast<float>(kind.radius)), peak(position.size(), static_cast<float>(kind.peak()));
+    std::vector<float> radius(position.size(), static_cast<float>(kind.radius)),
+        peak(position.size(), static_cast<float>(kind.peak()));
     peak[cloud.size()] = peak[cloud.size() + 1] = 0;  // probes
     const Octree tree = buildOctree(position, radius, peak);
     const auto depthTo = [&](const vec3& light, std::size_t particle) {

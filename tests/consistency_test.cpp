@@ -1,4 +1,5 @@
-// View and light agree: a camera at a distant light sees, as transmittance, what the lighting computed there (DESIGN §2).
+// View and light agree: a camera at a distant light sees, as transmittance, what the lighting computed there (DESIGN
+// §2).
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -40,8 +41,13 @@ TEST_P(ViewEqualsLight, OnEveryPixelThatHasAProbeBehindTheCloud) {
       peak.push_back(0);
     }
   const Octree tree = buildOctree(position, radius, peak);
-  const layout::Light light{.position = eye, .type = layout::kLightPoint, .direction = {0, -1, 0}, .decay = 2,
-                            .power = vec3(1), .shadowDensity = 1, .castsShadows = 1};
+  const layout::Light light{.position = eye,
+                            .type = layout::kLightPoint,
+                            .direction = {0, -1, 0},
+                            .decay = 2,
+                            .power = vec3(1),
+                            .shadowDensity = 1,
+                            .castsShadows = 1};
   const std::vector<float> lit = transmittances(opticalDepths(tree, light, {falloff, layout::kEndpointSoft, 0}), light);
 
   std::vector<layout::SplatParticle> splats;

@@ -19,13 +19,23 @@ constexpr layout::uint kFalloffs[] = {layout::kFalloffSmooth, layout::kFalloffLi
 constexpr layout::uint kEndpoints[] = {layout::kEndpointSoft, layout::kEndpointClamp};
 
 layout::Light pointLight(const vec3& position) {
-  return {.position = position, .type = layout::kLightPoint, .direction = {0, -1, 0}, .decay = 2, .power = vec3(1),
-          .shadowDensity = 1, .castsShadows = 1};
+  return {.position = position,
+          .type = layout::kLightPoint,
+          .direction = {0, -1, 0},
+          .decay = 2,
+          .power = vec3(1),
+          .shadowDensity = 1,
+          .castsShadows = 1};
 }
 
 layout::Light directionalLight(const vec3& direction) {
-  return {.position = {}, .type = layout::kLightDirectional, .direction = glm::normalize(direction), .decay = 0,
-          .power = vec3(1), .shadowDensity = 1, .castsShadows = 1};
+  return {.position = {},
+          .type = layout::kLightDirectional,
+          .direction = glm::normalize(direction),
+          .decay = 0,
+          .power = vec3(1),
+          .shadowDensity = 1,
+          .castsShadows = 1};
 }
 
 struct Cloud {
@@ -93,7 +103,8 @@ TEST(LightingOracle, AgreesForEqualRadiiAndDenseNeighbourhoods) {
   const Cloud cloud = ballCloud(2000, 12, 0.15, 0.15);
   for (const layout::uint falloff : kFalloffs)
     for (const layout::uint endpoint : kEndpoints)
-      EXPECT_LE(worstRelativeError(cloud.tree(falloff, true, 1e-3), pointLight({0, 4, 0}), {falloff, endpoint, 0}), 1e-4);
+      EXPECT_LE(worstRelativeError(cloud.tree(falloff, true, 1e-3), pointLight({0, 4, 0}), {falloff, endpoint, 0}),
+                1e-4);
 }
 
 TEST(Lighting, ScalarAndEveryInstructionSetGiveTheSameBits) {
@@ -228,8 +239,8 @@ TEST(Medium, PeakModeTakesTheChannelAsOpticalDepth) {
 
 TEST(Medium, CalibrationIsTheMeanOverLinesThroughParticles) {
   // A uniform ball of n particles, cross-section c each: a line through a uniformly drawn point in a uniformly drawn
-  // direction has the mean chord ∫ … = 1.5 R (for chords weighted by length: ⟨s²⟩/⟨s⟩ = (2R²)/(4R/3)), and the line's own
-  // particle adds its whole peak.
+  // direction has the mean chord ∫ … = 1.5 R (for chords weighted by length: ⟨s²⟩/⟨s⟩ = (2R²)/(4R/3)), and the line's
+  // own particle adds its whole peak.
   constexpr std::size_t kCount = 20000;
   const Cloud cloud = ballCloud(kCount, 19, 0.05, 0.05);
   std::vector<float> one(kCount, 1.0f);

@@ -47,9 +47,12 @@ TEST(Octree, KeepsThemForClustersOverManyScales) {
 TEST(Octree, KeepsThemForEqualPositionsLinesAndPlanes) {
   Cloud cloud = randomCloud(5000, 3);
   for (std::size_t i = 0; i < 5000; ++i) {
-    if (i < 2000) cloud.position[i] = {0.25f, 0.25f, 0.25f};
-    else if (i < 3000) cloud.position[i].x = cloud.position[i].y = 0;
-    else if (i < 4000) cloud.position[i].z = -1;
+    if (i < 2000)
+      cloud.position[i] = {0.25f, 0.25f, 0.25f};
+    else if (i < 3000)
+      cloud.position[i].x = cloud.position[i].y = 0;
+    else if (i < 4000)
+      cloud.position[i].z = -1;
   }
   EXPECT_EQ(validate(build(cloud, 8), 8), "");
   std::fill(cloud.position.begin(), cloud.position.end(), vec3(3, -4, 5));

@@ -35,8 +35,8 @@ Side run(const Frame& frame, const Scene& scene, Backends backends, Gpu* gpu) {
   Side side;
   Renderer renderer(backends, gpu);
   side.lit = renderer.light(frame, true, side.stats);
-  side.image = renderer.draw(frame, splatParticles(frame, scene.medium, side.lit), scene.output.depth, side.stats,
-                             &side.order);
+  side.image =
+      renderer.draw(frame, splatParticles(frame, scene.medium, side.lit), scene.output.depth, side.stats, &side.order);
   return side;
 }
 
@@ -78,7 +78,9 @@ double depthDifference(const Image& a, const Image& b) {
 
 void crosscheck(const CrosscheckOptions& options, const CommonOptions& common, int& exitCode) {
   Scene scene = readScene(options.scene.scene, options.scene.overrides);
-  if (!options.report.empty()) { const OutputFile probe(options.report); }
+  if (!options.report.empty()) {
+    const OutputFile probe(options.report);
+  }
   std::unique_ptr<Gpu> gpu;
   chooseBackends(Backend::Gpu, Backend::Gpu, deviceOptions(common), gpu);
   FrameStats stats;
@@ -87,7 +89,8 @@ void crosscheck(const CrosscheckOptions& options, const CommonOptions& common, i
   const Side device = run(frame, scene, {true, true}, gpu.get());
   requireNoValidationMessages(gpu.get());
 
-  const double limit = scene.lighting.cutoff > 0 ? std::max<double>(scene.lighting.cutoff, kRoundingLimit) : kRoundingLimit;
+  const double limit =
+      scene.lighting.cutoff > 0 ? std::max<double>(scene.lighting.cutoff, kRoundingLimit) : kRoundingLimit;
   std::vector<LightDifference> lights;
   bool same = true;
   for (std::size_t light = 0; light < frame.lights.size(); ++light) {
@@ -126,7 +129,8 @@ void crosscheck(const CrosscheckOptions& options, const CommonOptions& common, i
 
 void addCrosscheckCommand(CLI::App& app, const CommonOptions& common, int& exitCode) {
   auto options = std::make_shared<CrosscheckOptions>();
-  CLI::App* command = app.add_subcommand("crosscheck", "Compare CPU and compute: light, sort and picture; 1 if they differ");
+  CLI::App* command =
+      app.add_subcommand("crosscheck", "Compare CPU and compute: light, sort and picture; 1 if they differ");
   addSceneOptions(*command, options->scene);
   command->add_option("--report", options->report, "Write the differences as JSON")->type_name("OUT.json");
   command->callback([options, &common, &exitCode] { crosscheck(*options, common, exitCode); });

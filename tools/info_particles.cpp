@@ -214,7 +214,7 @@ std::string pointText(const Json& point) {
 std::string metadataText(const Json& entry) {
   if (entry["value"].is_string()) return entry["value"].get<std::string>();
   std::string text;
-  for (const Json& value : entry["value"]) text += (text.empty() ? "" : " ") + valueText(value);
+  for (const Json& value : entry["value"]) text += fmt::format("{}{}", text.empty() ? "" : " ", valueText(value));
   return text;
 }
 

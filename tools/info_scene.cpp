@@ -65,8 +65,8 @@ SourceFacts factsOf(const ParticleSource& source, int frame) {
 }
 
 /// Bytes that the stages of one frame hold at their peak: what grows with the particles or the picture, and the program
-/// itself. Within 15 % of the peaks measured on the host for 10⁵ to 4·10⁶ particles; the plume's generator (200 MB for
-/// its flow) and a driver come on top.
+/// itself. Within a fifth of the peaks measured on the host for 10⁵ to 4·10⁶ particles; the plume's generator (200 MB
+/// for its flow) and a driver come on top.
 struct MemoryNeed {
   double host = 0, device = 0;
 };

@@ -63,9 +63,9 @@ void light(const LightOptions& options, const CommonOptions& common) {
 
 void addLightCommand(CLI::App& app, const CommonOptions& common, int&) {
   auto options = std::make_shared<LightOptions>();
-  CLI::App* command =
-      app.add_subcommand("light", "Write every particle with Lighting (RGB, W/(m² sr) before the albedo) and "
-                                  "Transmittance_<light>");
+  CLI::App* command = app.add_subcommand("light",
+                                         "Write every particle with Lighting (RGB, W/(m² sr) before the albedo) and "
+                                         "Transmittance_<light>");
   addSceneOptions(*command, options->scene);
   command->add_option("-o,--output", options->output, "Particle file to write")->required()->type_name("LIT.prt");
   command->add_option("--lighting", options->lighting, "Where lighting runs: cpu, gpu or auto")->type_name("WHERE");

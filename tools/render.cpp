@@ -48,8 +48,8 @@ void checkOutputs(const RenderOptions& options, const Scene& scene) {
   for (const std::string& pattern : {scene.output.file, options.preview}) {
     if (pattern.empty()) continue;
     if (several && !hasFramePattern(pattern))
-      throw InputError(pattern, "", "#### in the name, since there are several frames",
-                       "the same name for all of them", "frame.####.exr, for example");
+      throw InputError(pattern, "", "#### in the name, since there are several frames", "the same name for all of them",
+                       "frame.####.exr, for example");
     OutputFile probe(framePath(pattern, scene.frames.first));
   }
   if (!options.stats.empty()) OutputFile probe(options.stats);
@@ -70,15 +70,14 @@ void renderFrame(Scene& scene, int number, const RenderOptions& options, Rendere
   stats.warnings = takeWarnings();
   writeFrameExr(path, image, frame, scene, run, stats);
   if (!options.preview.empty())
-    writePng(framePath(options.preview, number), image,
-             parseExposure(options.exposure).value_or(autoExposure(image)));
+    writePng(framePath(options.preview, number), image, parseExposure(options.exposure).value_or(autoExposure(image)));
   stats.seconds["write"] = write.seconds();
   stats.seconds["total"] = total.seconds();
-  logInfo(fmt::format("frame {}: {} particles, {} lights, {:.1f} s (load {:.1f}, octree {:.1f}, lighting {:.1f}, sort "
-                      "{:.1f}, splat {:.1f}, write {:.1f}) -> {}",
-                      number, stats.particles, stats.lights, stats.seconds["total"], stats.seconds["load"],
-                      stats.seconds["octree"], stats.seconds["lighting"], stats.seconds["sort"],
-                      stats.seconds["splat"], stats.seconds["write"], path));
+  logInfo(fmt::format(
+      "frame {}: {} particles, {} lights, {:.1f} s (load {:.1f}, octree {:.1f}, lighting {:.1f}, sort "
+      "{:.1f}, splat {:.1f}, write {:.1f}) -> {}",
+      number, stats.particles, stats.lights, stats.seconds["total"], stats.seconds["load"], stats.seconds["octree"],
+      stats.seconds["lighting"], stats.seconds["sort"], stats.seconds["splat"], stats.seconds["write"], path));
   run.frames.push_back(std::move(stats));
 }
 
@@ -108,7 +107,8 @@ void addRenderCommand(CLI::App& app, const CommonOptions& common, int&) {
   auto options = std::make_shared<RenderOptions>();
   CLI::App* command = app.add_subcommand("render", "Render a scene to OpenEXR");
   addSceneOptions(*command, options->scene);
-  command->add_option("-o,--output", options->output, "Picture to write; #### is the frame number")->type_name("OUT.exr");
+  command->add_option("-o,--output", options->output, "Picture to write; #### is the frame number")
+      ->type_name("OUT.exr");
   command->add_option("--frames", options->frames, "Frames A-B, or A-BxS for every S-th")->type_name("A-B[xS]");
   command->add_option("--size", options->size, "Picture size in pixels")->type_name("WxH");
   command->add_option("--lighting", options->lighting, "Where lighting runs: cpu, gpu or auto")->type_name("WHERE");

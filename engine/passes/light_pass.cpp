@@ -14,8 +14,8 @@ namespace {
 
 /// A multiple of every subgroup size there is (4–64), so that no subgroup is partly empty.
 constexpr std::uint32_t kGroupSize = 64;
-/// Rays an invocation: hardware hides latency with occupancy, which registers limit; lavapipe has no latency to hide and
-/// wants each load to serve many rays (measured: 1 → 1.5×, 2 → 1.3×, 4 → 1×, 8 → 1× the time).
+/// Rays an invocation: hardware hides latency with occupancy, which registers limit; lavapipe has no latency to hide
+/// and wants each load to serve many rays (measured: 1 → 1.5×, 2 → 1.3×, 4 → 1×, 8 → 1× the time).
 constexpr std::uint32_t kRaysOnCpu = 4, kRaysOnHardware = 1;
 /// Rays a submission: seconds at most, so that no watchdog of a display driver ends it and progress can be shown.
 constexpr std::uint32_t kRaysPerSubmit = 1 << 17;
@@ -32,8 +32,9 @@ LightPass::LightPass(const Device& device, layout::uint falloff, layout::uint en
       raysPerGroup_(kGroupSize * raysPerInvocation(device)) {}
 
 void LightPass::createPipeline(bool exact) {
-  const std::array constants{SpecializationConstant{0, kGroupSize}, SpecializationConstant{1, raysPerInvocation(device_)},
-                             SpecializationConstant{2, falloff_}, SpecializationConstant{3, endpoint_}};
+  const std::array constants{SpecializationConstant{0, kGroupSize},
+                             SpecializationConstant{1, raysPerInvocation(device_)}, SpecializationConstant{2, falloff_},
+                             SpecializationConstant{3, endpoint_}};
   pipeline_ = device_.createComputePipeline(exact ? spirv::light_exact_comp : spirv::light_comp,
                                             sizeof(layout::LightParams), constants);
 }

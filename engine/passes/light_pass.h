@@ -16,7 +16,8 @@ class LightPass {
   /// `device` must outlive the pass.
   LightPass(const Device& device, layout::uint falloff, layout::uint endpoint);
 
-  /// Compiles the shader for the tree and copies it, which must stay alive, to the device: 20 bytes a particle, 32 bytes a node. Throws MachineError where it does not fit.
+  /// Compiles the shader for the tree and copies it, which must stay alive, to the device: 20 bytes a particle, 32
+  /// bytes a node. Throws MachineError where it does not fit.
   void setTree(const Octree& tree);
 
   /// As mote::opticalDepths for the tree that was set, with the rules of the constructor; T within 2e-5 of it for

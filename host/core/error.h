@@ -43,11 +43,11 @@ namespace detail {
 }  // namespace mote
 
 /// A bug if it fails: MOTE_CHECK(a, ==, b) prints both values and aborts. On in release builds too.
-#define MOTE_CHECK(left, op, right)                                                                             \
-  do {                                                                                                          \
-    const auto& moteLeft_ = (left);                                                                             \
-    const auto& moteRight_ = (right);                                                                           \
-    if (!(moteLeft_ op moteRight_))                                                                             \
-      ::mote::detail::checkFailed(#left " " #op " " #right, fmt::format("{}", moteLeft_),                       \
-                                  fmt::format("{}", moteRight_), __FILE__, __LINE__);                           \
+#define MOTE_CHECK(left, op, right)                                                       \
+  do {                                                                                    \
+    const auto& moteLeft_ = (left);                                                       \
+    const auto& moteRight_ = (right);                                                     \
+    if (!(moteLeft_ op moteRight_))                                                       \
+      ::mote::detail::checkFailed(#left " " #op " " #right, fmt::format("{}", moteLeft_), \
+                                  fmt::format("{}", moteRight_), __FILE__, __LINE__);     \
   } while (false)

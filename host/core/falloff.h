@@ -1,5 +1,5 @@
-// Falloff of a particle's optical depth (DESIGN §2), in single precision as every kernel computes it, for lighting and for
-// the view. The GLSL twin is shaders/glsl/lib/falloff.glsl.
+// Falloff of a particle's optical depth (DESIGN §2), in single precision as every kernel computes it, for lighting and
+// for the view. The GLSL twin is shaders/glsl/lib/falloff.glsl.
 #pragma once
 #include <algorithm>
 #include <cmath>

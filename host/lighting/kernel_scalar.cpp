@@ -1,5 +1,5 @@
-// The walk in plain words. Everything here is single precision in a fixed order; kernel_simd.cpp does the same operations
-// on vectors, and a test compares the bits.
+// The walk in plain words. Everything here is single precision in a fixed order; kernel_simd.cpp does the same
+// operations on vectors, and a test compares the bits.
 #include <cmath>
 
 #include "host/lighting/kernel.h"

@@ -52,8 +52,10 @@ HWY_INLINE Vec falloffOf(Vec q) {
     return hn::Max(hn::Sub(one, hn::Sqrt(q)), zero);
   } else {
     const Vec u = hn::Max(hn::Sub(one, q), zero);
-    if constexpr (kFalloff == layout::kFalloffSphere) return hn::Sqrt(u);
-    else return hn::Mul(u, u);
+    if constexpr (kFalloff == layout::kFalloffSphere)
+      return hn::Sqrt(u);
+    else
+      return hn::Mul(u, u);
   }
 }
 
@@ -101,8 +103,8 @@ HWY_NOINLINE void addNearEnd(const Packet& packet, const Rays& rays, const Parti
     if constexpr (kEndpoint == layout::kEndpointSoft) {
       const Vec ex = hn::Sub(dx, hn::Mul(t, vx)), ey = hn::Sub(dy, hn::Mul(t, vy)), ez = hn::Sub(dz, hn::Mul(t, vz));
       const Vec q = hn::Mul(dot3(ex, ey, ez, ex, ey, ez), p.inverseSquare);
-      const Vec halfChord = hn::Mul(hn::Set(kTag, radius),
-                                    hn::Sqrt(hn::Max(hn::Sub(hn::Set(kTag, 1.0f), q), hn::Zero(kTag))));
+      const Vec halfChord =
+          hn::Mul(hn::Set(kTag, radius), hn::Sqrt(hn::Max(hn::Sub(hn::Set(kTag, 1.0f), q), hn::Zero(kTag))));
       share = hn::Mul(hn::Mul(falloffOf<kFalloff>(q), capOf(hn::Add(before, t), halfChord)),
                       capOf(hn::Sub(after, t), halfChord));
     } else {
@@ -110,8 +112,8 @@ HWY_NOINLINE void addNearEnd(const Packet& packet, const Rays& rays, const Parti
       const Vec ex = hn::Sub(dx, hn::Mul(c, vx)), ey = hn::Sub(dy, hn::Mul(c, vy)), ez = hn::Sub(dz, hn::Mul(c, vz));
       share = falloffOf<kFalloff>(hn::Mul(dot3(ex, ey, ez, ex, ey, ez), p.inverseSquare));
     }
-    const auto isSelf = hn::RebindMask(
-        kTag, hn::Eq(hn::Load(slotTag, packet.self + v * kLanes), hn::Set(slotTag, slot)));
+    const auto isSelf =
+        hn::RebindMask(kTag, hn::Eq(hn::Load(slotTag, packet.self + v * kLanes), hn::Set(slotTag, slot)));
     depths.of[v] = hn::Add(depths.of[v], hn::IfThenZeroElse(isSelf, hn::Mul(p.peak, share)));
   }
 }
@@ -144,8 +146,7 @@ HWY_INLINE StandingBits standingBits(const Octree& tree, const Packet& packet, s
     const auto near = hn::Lt(dot3(ex, ey, ez, ex, ey, ez), hn::Mul(limit, limit));
     const auto ahead = hn::Gt(t, hn::Neg(hn::Add(radius, hn::Set(kTag, packet.behind))));
     const auto candidate = hn::And(hn::And(near, ahead), hn::Gt(radius, hn::Zero(kTag)));
-    const auto between =
-        hn::And(hn::Ge(t, clear), hn::Ge(hn::Sub(hn::Set(kTag, packet.axisLength), t), clear));
+    const auto between = hn::And(hn::Ge(t, clear), hn::Ge(hn::Sub(hn::Set(kTag, packet.axisLength), t), clear));
     bits.candidate |= bitsOf(candidate) << (v * kLanes);
     bits.between |= bitsOf(between) << (v * kLanes);
   }

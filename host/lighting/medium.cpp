@@ -14,8 +14,8 @@ double kernelPeak(layout::uint falloff, double radius) {
   return (falloff == layout::kFalloffSphere ? 1.5 : 3.0) / area;
 }
 
-std::vector<float> peakOpticalDepths(std::span<const float> density, std::span<const float> radius, layout::uint falloff,
-                                     bool crossSection, double scale) {
+std::vector<float> peakOpticalDepths(std::span<const float> density, std::span<const float> radius,
+                                     layout::uint falloff, bool crossSection, double scale) {
   MOTE_CHECK(density.size(), ==, radius.size());
   std::vector<float> peaks(density.size());
   parallelBlocks(peaks.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {

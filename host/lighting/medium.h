@@ -1,4 +1,5 @@
-// From the channel Density to optical depths: the normalised kernels W and the calibration of density_scale (DESIGN §2).
+// From the channel Density to optical depths: the normalised kernels W and the calibration of density_scale (DESIGN
+// §2).
 #pragma once
 #include <cstdint>
 #include <span>
@@ -13,13 +14,13 @@ namespace mote {
 /// smooth and linear 3 / (π r²), sphere 3 / (2 π r²).
 double kernelPeak(layout::uint falloff, double radius);
 
-/// Optical depth through each particle's centre: density · kernelPeak in mode cross_section, density itself in mode peak
-/// (the thesis), times `scale`. Beyond float's range it is held at the greatest finite float.
-std::vector<float> peakOpticalDepths(std::span<const float> density, std::span<const float> radius, layout::uint falloff,
-                                     bool crossSection, double scale);
+/// Optical depth through each particle's centre: density · kernelPeak in mode cross_section, density itself in mode
+/// peak (the thesis), times `scale`. Beyond float's range it is held at the greatest finite float.
+std::vector<float> peakOpticalDepths(std::span<const float> density, std::span<const float> radius,
+                                     layout::uint falloff, bool crossSection, double scale);
 
-/// Lines that the calibration draws: the standard error of their mean is a few percent for smoke, and it is the same for
-/// every frame of a shot with the same particle count.
+/// Lines that the calibration draws: the standard error of their mean is a few percent for smoke, and it is the same
+/// for every frame of a shot with the same particle count.
 constexpr std::size_t kCalibrationLines = 4096;
 
 /// Mean optical depth of straight lines through particles of the tree in uniformly random directions, both drawn from

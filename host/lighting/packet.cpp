@@ -84,7 +84,8 @@ Packet makePacket(const Octree& tree, const layout::Light& light, const std::uin
 
 Packet makeLinePacket(const vec3& origin, const vec3& direction, const PacketRules& rules) {
   Packet packet;
-  for (int lane = 0; lane < kPacketRays; ++lane) setRay(packet, lane, origin, glm::normalize(dvec3(direction)), kInfinity, kNoSlot);
+  for (int lane = 0; lane < kPacketRays; ++lane)
+    setRay(packet, lane, origin, glm::normalize(dvec3(direction)), kInfinity, kNoSlot);
   setAxis(packet, origin, direction, true);
   setShaft(packet, rules);
   return packet;
@@ -93,7 +94,8 @@ Packet makeLinePacket(const vec3& origin, const vec3& direction, const PacketRul
 PacketRules packetRules(const Octree& tree) {
   const Bounds bounds = tree.bounds();
   if (bounds.empty()) return {0, 0};
-  const float extent = std::max(glm::length(bounds.size()), glm::length(glm::max(glm::abs(bounds.lo), glm::abs(bounds.hi))));
+  const float extent =
+      std::max(glm::length(bounds.size()), glm::length(glm::max(glm::abs(bounds.lo), glm::abs(bounds.hi))));
   // Coordinates, differences and directions each round to 6e-8 of the extent; 2e-6 leaves a factor of ten.
   return {2e-6f * extent, 256.0f * tree.leastRadius};
 }

@@ -11,7 +11,8 @@
 
 namespace mote {
 
-/// Rays a packet. Fixed, whatever the width of the vectors: decisions taken for a packet must not depend on the machine.
+/// Rays a packet. Fixed, whatever the width of the vectors: decisions taken for a packet must not depend on the
+/// machine.
 constexpr int kPacketRays = 16;
 /// "No slot": a ray that starts at no particle leaves nothing out.
 constexpr std::uint32_t kNoSlot = 0xffffffffu;
@@ -26,24 +27,25 @@ struct Rays {
 };
 
 struct Packet {
-  Rays rays;                                     ///< base 0: origins are the particles, before 0, after the length
-  alignas(64) float directionX[kPacketRays], directionY[kPacketRays], directionZ[kPacketRays];  ///< unit, toward the light
-  alignas(64) std::uint32_t self[kPacketRays];   ///< slot that the ray leaves out, or kNoSlot
-  alignas(64) float opticalDepth[kPacketRays];   ///< the sum so far; starts at 0
+  Rays rays;  ///< base 0: origins are the particles, before 0, after the length
+  alignas(64) float directionX[kPacketRays], directionY[kPacketRays],
+      directionZ[kPacketRays];                  ///< unit, toward the light
+  alignas(64) std::uint32_t self[kPacketRays];  ///< slot that the ray leaves out, or kNoSlot
+  alignas(64) float opticalDepth[kPacketRays];  ///< the sum so far; starts at 0
   /// Directions and lengths before rounding, for rebase().
   alignas(64) double exactX[kPacketRays], exactY[kPacketRays], exactZ[kPacketRays], exactLength[kPacketRays];
 
   vec3 axisOrigin;
-  vec3 axisDirection;   ///< unit
-  float axisLength;     ///< +∞ for directional
-  vec3 inverseStep;     ///< 1 / (axis vector), the vector to the light or, for directional, the unit direction
-  float firstStep;      ///< start of the segment in that parameter, ≤ 0: the hindmost origin
-  float lastStep;       ///< … and its end: 1, or +∞
-  vec3 spread;          ///< rays stay this near to the axis line, per coordinate (with slack against rounding)
-  float tube;           ///< … and this near to the axis line
-  float ahead;          ///< how far along the axis the foremost origin lies before axisOrigin, ≥ 0
-  float behind;         ///< … and the hindmost behind it, ≥ 0
-  float farDistance;    ///< leaves farther than this from axisOrigin need rebase()
+  vec3 axisDirection;  ///< unit
+  float axisLength;    ///< +∞ for directional
+  vec3 inverseStep;    ///< 1 / (axis vector), the vector to the light or, for directional, the unit direction
+  float firstStep;     ///< start of the segment in that parameter, ≤ 0: the hindmost origin
+  float lastStep;      ///< … and its end: 1, or +∞
+  vec3 spread;         ///< rays stay this near to the axis line, per coordinate (with slack against rounding)
+  float tube;          ///< … and this near to the axis line
+  float ahead;         ///< how far along the axis the foremost origin lies before axisOrigin, ≥ 0
+  float behind;        ///< … and the hindmost behind it, ≥ 0
+  float farDistance;   ///< leaves farther than this from axisOrigin need rebase()
 };
 
 /// What a tree's geometry asks of its packets.
@@ -63,7 +65,8 @@ Packet makePacket(const Octree& tree, const layout::Light& light, const std::uin
 Packet makeLinePacket(const vec3& origin, const vec3& direction, const PacketRules& rules);
 
 /// In single precision a ray is 1e-7 of the distance off where it passes a particle, which matters to b²/r² once the
-/// distance is hundreds of radii. Beyond that, the rays are moved (in double) to a base in the leaf and are exact again.
+/// distance is hundreds of radii. Beyond that, the rays are moved (in double) to a base in the leaf and are exact
+/// again.
 inline void rebase(const Packet& packet, const vec3& base, Rays& rays) {
   rays.base = base;
   for (int lane = 0; lane < kPacketRays; ++lane) {

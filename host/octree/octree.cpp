@@ -178,8 +178,8 @@ Octree buildOctree(std::span<const vec3> position, std::span<const float> radius
   MOTE_CHECK(position.size(), ==, peak.size());
   MOTE_CHECK(particlesPerCell, >=, 1u);
   if (position.size() > 0xfffffffeull)
-    throw InputError(fmt::format("{} particles: Mote numbers particles with 32 bits, so at most 4294967294",
-                                 position.size()));
+    throw InputError(
+        fmt::format("{} particles: Mote numbers particles with 32 bits, so at most 4294967294", position.size()));
   Octree tree;
   const std::vector<CodedParticle> order = mortonOrder(position);
   gatherSlots(tree, order, position, radius, peak);

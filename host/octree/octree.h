@@ -22,17 +22,17 @@ constexpr std::uint32_t kDefaultParticlesPerCell = 32;
 constexpr std::size_t kSlotPadding = 16;
 
 struct Octree {
-  std::vector<layout::Node> nodes;              ///< depth first; the last is the sentinel
-  std::vector<float> x, y, z;                   ///< centres in slot order [scene units]; padded
-  std::vector<float> radius;                    ///< support radii in slot order; padded
-  std::vector<float> peak;                      ///< optical depth through the centre in slot order; padded
-  std::vector<std::uint32_t> source;            ///< slot → index in the input; not padded
-  float leastRadius = 0;                        ///< smallest support radius above 0; 0 without particles
+  std::vector<layout::Node> nodes;    ///< depth first; the last is the sentinel
+  std::vector<float> x, y, z;         ///< centres in slot order [scene units]; padded
+  std::vector<float> radius;          ///< support radii in slot order; padded
+  std::vector<float> peak;            ///< optical depth through the centre in slot order; padded
+  std::vector<std::uint32_t> source;  ///< slot → index in the input; not padded
+  float leastRadius = 0;              ///< smallest support radius above 0; 0 without particles
 
   std::size_t particleCount() const { return source.size(); }
   std::size_t nodeCount() const { return nodes.empty() ? 0 : nodes.size() - 1; }
   vec3 position(std::size_t slot) const { return {x[slot], y[slot], z[slot]}; }
-  Bounds bounds() const;                        ///< of all supports
+  Bounds bounds() const;  ///< of all supports
 };
 
 /// Builds the tree in parallel; the result does not depend on the number of threads.

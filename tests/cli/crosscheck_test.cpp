@@ -21,7 +21,8 @@ nlohmann::json crosscheckPlume(const TempFolder& folder, const std::string& cuto
 void expectAgreement(const nlohmann::json& report, double limit) {
   EXPECT_EQ(report["particles"], 350000);
   ASSERT_GE(report["lights"].size(), 2u);
-  for (const auto& light : report["lights"]) EXPECT_LE(light["worst_delta_transmittance"].get<double>(), limit) << light;
+  for (const auto& light : report["lights"])
+    EXPECT_LE(light["worst_delta_transmittance"].get<double>(), limit) << light;
   EXPECT_EQ(report["sort_identical"], true);
   EXPECT_GE(report["picture"]["within"].get<double>(), 0.999);
   EXPECT_LE(report["picture"]["rmse"].get<double>(), 1e-3);

@@ -17,9 +17,12 @@ struct LitFile {
 LitFile readLit(const std::string& path) {
   LitFile lit;
   const PrtReader reader(path);
-  const std::vector<PrtRequest> requests{{"Position", &lit.position}, {"Lighting", &lit.lighting},
-                                         {"Radius", &lit.radius},     {"Density", &lit.density},
-                                         {"ID", &lit.id},             {"Transmittance_lamp", &lit.lamp},
+  const std::vector<PrtRequest> requests{{"Position", &lit.position},
+                                         {"Lighting", &lit.lighting},
+                                         {"Radius", &lit.radius},
+                                         {"Density", &lit.density},
+                                         {"ID", &lit.id},
+                                         {"Transmittance_lamp", &lit.lamp},
                                          {"Transmittance_sun", &lit.sun}};
   reader.read(requests);
   return lit;
@@ -48,7 +51,8 @@ TEST(LightCommand, WritesWhatTheDefinitionGivesForEveryParticle) {
       {"name": "lamp", "type": "point", "position": [1.5, 2, -0.5], "color": [1, 0.5, 0.25], "intensity": 20},
       {"name": "sun", "type": "directional", "direction": [0, -2, 0], "irradiance": 3, "shadow_density": 0.5}
     ]})");
-  const ProcessResult result = mote({"light", folder.file("scene.json"), "-o", folder.file("lit.prt"), "--lighting", "cpu"});
+  const ProcessResult result =
+      mote({"light", folder.file("scene.json"), "-o", folder.file("lit.prt"), "--lighting", "cpu"});
   ASSERT_EQ(result.exitCode, 0) << result.err;
 
   const LitFile lit = readLit(folder.file("lit.prt"));

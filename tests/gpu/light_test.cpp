@@ -13,12 +13,22 @@ constexpr layout::uint kFalloffs[] = {layout::kFalloffSmooth, layout::kFalloffLi
 constexpr layout::uint kEndpoints[] = {layout::kEndpointSoft, layout::kEndpointClamp};
 
 layout::Light pointLight(const vec3& position) {
-  return {.position = position, .type = layout::kLightPoint, .direction = {0, -1, 0}, .decay = 2, .power = vec3(1),
-          .shadowDensity = 1, .castsShadows = 1};
+  return {.position = position,
+          .type = layout::kLightPoint,
+          .direction = {0, -1, 0},
+          .decay = 2,
+          .power = vec3(1),
+          .shadowDensity = 1,
+          .castsShadows = 1};
 }
 layout::Light directionalLight(const vec3& direction) {
-  return {.position = {}, .type = layout::kLightDirectional, .direction = glm::normalize(direction), .decay = 0,
-          .power = vec3(1), .shadowDensity = 1, .castsShadows = 1};
+  return {.position = {},
+          .type = layout::kLightDirectional,
+          .direction = glm::normalize(direction),
+          .decay = 0,
+          .power = vec3(1),
+          .shadowDensity = 1,
+          .castsShadows = 1};
 }
 
 /// Uniform in the unit ball with log-uniform radii, some at equal positions, one at `light`.
@@ -61,8 +71,8 @@ TEST_F(LightPassTest, AgreesWithTheHostUnderEveryRule) {
   for (const layout::uint falloff : kFalloffs) {
     const Octree tree = ballTree(5000, 0.05, 0.15, 2, falloff, inside);
     for (const layout::uint endpoint : kEndpoints)
-      for (const layout::Light& light : {pointLight(inside), pointLight({2, 3, 1}), directionalLight({0, -1, -0.3f}),
-                                         directionalLight({0, 0, 1})})
+      for (const layout::Light& light :
+           {pointLight(inside), pointLight({2, 3, 1}), directionalLight({0, -1, -0.3f}), directionalLight({0, 0, 1})})
         worst = std::max(worst, worstTransmittance(tree, light, falloff, endpoint, 0));
   }
   std::printf("worst |dT| with cutoff 0: %.2e\n", worst);
@@ -89,7 +99,8 @@ TEST_F(LightPassTest, StopsEarlyWithinTheCutoff) {
 
 TEST_F(LightPassTest, TakesAnyNumberOfParticles) {
   for (const std::size_t count : {1, 2, 3, 63, 64, 65, 255, 256, 257, 1000})
-    EXPECT_LE(worstTransmittance(ballTree(count, 0.2, 0.4, 1, 0, {0, 0, 0}), pointLight({0, 2, 0}), 0, 0, 0), 2e-5) << count;
+    EXPECT_LE(worstTransmittance(ballTree(count, 0.2, 0.4, 1, 0, {0, 0, 0}), pointLight({0, 2, 0}), 0, 0, 0), 2e-5)
+        << count;
 }
 
 TEST_F(LightPassTest, GivesNothingForNoParticlesAndZerosWithoutShadows) {
