@@ -66,7 +66,7 @@ HWY_INLINE Vec capOf(Vec t, Vec halfChord) {
   return hn::Add(hn::Set(kTag, 0.5f), hn::Mul(x, inner));
 }
 
-/// The sums so far.
+/// The sums so far. Passed by value to what is not inlined, so that the hot loop keeps them in registers.
 struct Depths {
   Vec of[kVectors];
 };
@@ -90,8 +90,8 @@ HWY_INLINE void addBetween(const RayVectors& rays, const Particle& p, Depths& de
 }
 
 template <layout::uint kFalloff, layout::uint kEndpoint>
-HWY_NOINLINE void addNearEnd(const Packet& packet, const Rays& rays, const Particle& p, float radius,
-                             std::uint32_t slot, Depths& depths) {
+HWY_NOINLINE Depths addNearEnd(const Packet& packet, const Rays& rays, const Particle& p, float radius,
+                               std::uint32_t slot, Depths depths) {
   const hn::RebindToUnsigned<Tag> slotTag;
   const RayVectors r = loadRays(packet, rays);
   for (int v = 0; v < kVectors; ++v) {
@@ -116,6 +116,7 @@ HWY_NOINLINE void addNearEnd(const Packet& packet, const Rays& rays, const Parti
         hn::RebindMask(kTag, hn::Eq(hn::Load(slotTag, packet.self + v * kLanes), hn::Set(slotTag, slot)));
     depths.of[v] = hn::Add(depths.of[v], hn::IfThenZeroElse(isSelf, hn::Mul(p.peak, share)));
   }
+  return depths;
 }
 
 /// Bits of the lanes of kPacketRays particles from `slot` on: see Standing.
@@ -169,17 +170,18 @@ HWY_INLINE void addLeaf(const Octree& tree, std::uint32_t begin, std::uint32_t e
       if (bits.between >> bit & 1)
         addBetween<kFalloff>(vectors, particle, depths);
       else
-        addNearEnd<kFalloff, kEndpoint>(packet, rays, particle, radius, slot, depths);
+        depths = addNearEnd<kFalloff, kEndpoint>(packet, rays, particle, radius, slot, depths);
     }
   }
 }
 
 template <layout::uint kFalloff, layout::uint kEndpoint>
-HWY_NOINLINE void addFarLeaf(const Octree& tree, const layout::Node& leaf, std::uint32_t end, const Packet& packet,
-                             Depths& depths) {
+HWY_NOINLINE Depths addFarLeaf(const Octree& tree, const layout::Node& leaf, std::uint32_t end, const Packet& packet,
+                               Depths depths) {
   Rays moved;
   rebase(packet, centreOf(leaf), moved);
   addLeaf<kFalloff, kEndpoint>(tree, leaf.first, end, packet, moved, loadRays(packet, moved), depths);
+  return depths;
 }
 
 HWY_INLINE bool allBeyond(const Depths& depths, float limit) {
@@ -204,7 +206,7 @@ HWY_NOINLINE void walk(const Octree& tree, float limit, Packet& packet) {
     if (node.skip == ++index) {  // a leaf
       const std::uint32_t end = nodes[index].first;
       if (isFar(packet, centreOf(node)))
-        addFarLeaf<kFalloff, kEndpoint>(tree, node, end, packet, depths);
+        depths = addFarLeaf<kFalloff, kEndpoint>(tree, node, end, packet, depths);
       else
         addLeaf<kFalloff, kEndpoint>(tree, node.first, end, packet, packet.rays, vectors, depths);
       if (allBeyond(depths, limit)) break;

@@ -40,18 +40,20 @@ void setShaft(Packet& packet, const PacketRules& rules) {
   const float slack = rules.slack;
   packet.rays.base = vec3(0);
   packet.farDistance = rules.farDistance;
-  packet.spread = vec3(slack);
+  vec3 spread(slack);
   packet.tube = packet.ahead = packet.behind = slack;
   for (int lane = 0; lane < kPacketRays; ++lane) {
     const vec3 offset =
         vec3(packet.rays.originX[lane], packet.rays.originY[lane], packet.rays.originZ[lane]) - packet.axisOrigin;
     const float along = glm::dot(offset, packet.axisDirection);
     const vec3 across = offset - along * packet.axisDirection;
-    packet.spread = glm::max(packet.spread, glm::abs(across) + slack);
+    spread = glm::max(spread, glm::abs(across) + slack);
     packet.tube = std::max(packet.tube, glm::length(across) + slack);
     packet.ahead = std::max(packet.ahead, along + slack);
     packet.behind = std::max(packet.behind, slack - along);
   }
+  packet.slabLow = packet.axisOrigin + spread;
+  packet.slabHigh = packet.axisOrigin - spread;
   packet.firstStep = std::isinf(packet.axisLength) ? -packet.behind
                      : packet.axisLength > 0       ? -packet.behind / packet.axisLength
                                                    : -kInfinity;
