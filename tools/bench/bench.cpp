@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "host/core/error.h"
@@ -60,10 +61,10 @@ void print(const Comparison& comparison) {
   fmt::print("  check  {}: {}\n", comparison.check.text, comparison.check.passed ? "ok" : "DIFFERS");
   if (!comparison.check.passed) fmt::print("  not timed, because the results are wrong\n");
   if (!comparison.secondsA.empty())
-    fmt::print("  A      {:<36} {:>14}  {}\n", comparison.a, rate(count, comparison.medianA()),
+    fmt::print("  A      {:<39} {:>13}  {}\n", comparison.a, rate(count, comparison.medianA()),
                spread(comparison.secondsA, " s"));
   if (!comparison.secondsB.empty()) {
-    fmt::print("  B      {:<36} {:>14}  {}\n", comparison.b, rate(count, comparison.medianB()),
+    fmt::print("  B      {:<39} {:>13}  {}\n", comparison.b, rate(count, comparison.medianB()),
                spread(comparison.secondsB, " s"));
     fmt::print("  B / A  {}\n", spread(comparison.ratios(), ""));
   }
@@ -162,6 +163,7 @@ const Comparison* Bench::compare(const std::string& name, const std::string& uni
     progress.advance(1);
   }
   print(comparison);
+  if (std::fflush(stdout) != 0) throw MachineError("writing to stdout failed");  // the next one may take a minute
   comparisons_.push_back(std::move(comparison));
   return comparisons_.back().check.passed ? &comparisons_.back() : nullptr;
 }

@@ -1,0 +1,130 @@
+// mote bench: tiny runs of each, for what it checks, prints and reports; how fast anything is, no test says.
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "tests/cli/mote_program.h"
+
+namespace mote::test {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kRuns = 4;  // even: the median lies between two of them
+
+ProcessResult bench(const std::string& which, const std::string& report, const ProcessOptions& options) {
+  return mote({"bench", which, "--count", "3000", "--runs", std::to_string(kRuns), "--report", report}, options);
+}
+
+Json readJson(const std::string& path) { return Json::parse(readBytes(path)); }
+
+double middle(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return 0.5 * (values[kRuns / 2 - 1] + values[kRuns / 2]);
+}
+
+/// A comparison with both halves: as many seconds of each as runs, and ratios that follow from them.
+void expectBothTimed(const Json& run) {
+  const auto a = run["seconds_a"].get<std::vector<double>>(), b = run["seconds_b"].get<std::vector<double>>();
+  ASSERT_EQ(a.size(), kRuns) << run;
+  ASSERT_EQ(b.size(), kRuns) << run;
+  std::vector<double> ratios;
+  for (int i = 0; i < kRuns; ++i) {
+    EXPECT_GT(a[i], 0) << run;
+    ratios.push_back(b[i] / a[i]);
+  }
+  EXPECT_DOUBLE_EQ(run["ratio_median"].get<double>(), middle(ratios)) << run;
+  EXPECT_DOUBLE_EQ(run["ratio_min"].get<double>(), *std::min_element(ratios.begin(), ratios.end())) << run;
+  EXPECT_DOUBLE_EQ(run["ratio_max"].get<double>(), *std::max_element(ratios.begin(), ratios.end())) << run;
+  EXPECT_TRUE(run["b"].is_string()) << run;
+}
+
+TEST(BenchCommand, TimesBothHalvesOfEachBenchmarkAndReportsThem) {
+  const TempFolder folder;
+  const std::string report = folder.file("report.json");
+  const std::vector<std::pair<std::string, std::size_t>> comparisons{{"lighting", 2}, {"sort", 1}, {"splat", 1}};
+  for (const auto& [which, count] : comparisons) {
+    SCOPED_TRACE(which);
+    const ProcessResult result = bench(which, report, kOnLavapipe);
+    ASSERT_EQ(result.exitCode, 0) << result.out << result.err;
+    EXPECT_EQ(result.err, "");
+    EXPECT_TRUE(contains(result.out, "device: llvmpipe"));
+    EXPECT_TRUE(contains(result.out, "B / A"));
+
+    const Json root = readJson(report);
+    EXPECT_TRUE(contains(root["device"].get<std::string>(), "llvmpipe"));
+    EXPECT_GE(root["threads"].get<int>(), 1);
+    ASSERT_EQ(root["runs"].size(), count);
+    for (const Json& run : root["runs"]) {
+      EXPECT_EQ(run["count"], 3000);
+      EXPECT_EQ(run["check"]["passed"], true) << run;
+      expectBothTimed(run);
+    }
+  }
+}
+
+TEST(BenchCommand, HoldsTheFiguresAgainstTheFloors) {
+  const TempFolder folder;
+  const ProcessResult result = bench("lighting", folder.file("report.json"), kOnLavapipe);
+  ASSERT_EQ(result.exitCode, 0) << result.out << result.err;
+  EXPECT_TRUE(contains(result.out, "floors, for 1000000 on 2 cores; this was 3000"));
+  const Json root = readJson(folder.file("report.json"));
+  ASSERT_EQ(root["floors"].size(), 3u);
+  for (const Json& floor : root["floors"]) {
+    const double value = floor["value"], limit = floor["limit"];
+    EXPECT_EQ(floor["reached"], floor["wanted"] == "at least" ? value >= limit : value <= limit) << floor;
+  }
+  const Json &build = root["runs"][0], &lighting = root["runs"][1];
+  EXPECT_DOUBLE_EQ(root["floors"][0]["value"].get<double>(), middle(build["seconds_b"]) / 3000 * 1e6);
+  EXPECT_DOUBLE_EQ(root["floors"][1]["value"].get<double>(), 3000 / middle(lighting["seconds_a"]) * 1e-6);
+  EXPECT_EQ(root["floors"][2]["value"], lighting["ratio_median"]);
+}
+
+TEST(BenchCommand, LeavesTheDevicesHalvesOutWhereThereIsNone) {
+  const TempFolder folder;
+  const std::string report = folder.file("report.json");
+  for (const char* which : {"lighting", "sort", "splat"}) {
+    SCOPED_TRACE(which);
+    const ProcessResult result = bench(which, report, kWithoutVulkan);
+    ASSERT_EQ(result.exitCode, 0) << result.out << result.err;
+    EXPECT_TRUE(contains(result.out, "device: none, so what runs on it is left out: "));
+    const Json root = readJson(report);
+    EXPECT_EQ(root["device"], "none");
+    const Json& last = root["runs"].back();
+    EXPECT_EQ(last["seconds_a"].size(), kRuns);
+    EXPECT_EQ(last["seconds_b"].size(), 0u);
+    EXPECT_TRUE(last["b"].is_null() && last["ratio_median"].is_null()) << last;
+    EXPECT_EQ(last["check"]["passed"], true) << last;
+  }
+}
+
+TEST(BenchCommand, DoesNotGoOnWithoutTheDeviceThatWasAskedFor) {
+  const std::vector<std::string> arguments{"bench", "sort", "--count", "100", "--device", "no such device"};
+  const ProcessResult misspelt = mote(arguments, kOnLavapipe);
+  EXPECT_EQ(misspelt.exitCode, 2);
+  EXPECT_TRUE(contains(misspelt.err, "no such device"));
+  const ProcessResult none = mote(arguments, kWithoutVulkan);
+  EXPECT_EQ(none.exitCode, 3);
+  EXPECT_EQ(misspelt.out + none.out, "");
+}
+
+TEST(BenchCommand, RefusesWhatItCannotDoBeforeItStarts) {
+  const TempFolder folder;
+  const std::string missing = folder.file("missing/report.json");
+  const std::vector<std::vector<std::string>> wrong{{"bench"},
+                                                    {"bench", "octree"},
+                                                    {"bench", "sort", "--count", "1"},
+                                                    {"bench", "sort", "--count", "-5"},
+                                                    {"bench", "sort", "--runs", "0"},
+                                                    {"bench", "sort", "--report", missing}};
+  for (const std::vector<std::string>& arguments : wrong) {
+    const ProcessResult result = mote(arguments, kOnLavapipe);
+    SCOPED_TRACE(arguments.back());
+    EXPECT_EQ(result.exitCode, 2) << result.err;
+    EXPECT_EQ(result.out, "");
+    EXPECT_NE(result.err, "");
+  }
+  EXPECT_TRUE(folder.entries().empty());
+}
+
+}  // namespace
+}  // namespace mote::test
