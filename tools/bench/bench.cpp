@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "host/core/error.h"
@@ -39,11 +40,14 @@ void runOnce(const Contender& contender) {
   contender.work();
 }
 
-double secondsOf(const Contender& contender) {
+/// Appends the wall-clock seconds and the CPU seconds, over all threads, of one run.
+void time(const Contender& contender, std::vector<double>& seconds, std::vector<double>& core) {
   if (contender.prepare) contender.prepare();
+  const std::clock_t coreStart = std::clock();
   const Timer timer;
   contender.work();
-  return timer.seconds();
+  seconds.push_back(timer.seconds());
+  core.push_back(static_cast<double>(std::clock() - coreStart) / CLOCKS_PER_SEC);
 }
 
 /// "0.0986 s (0.0981 .. 0.1204)": median, least and greatest.
@@ -60,14 +64,15 @@ void print(const Comparison& comparison) {
   fmt::print("\n{}, {} {}\n", comparison.name, comparison.count, comparison.unit);
   fmt::print("  check  {}: {}\n", comparison.check.text, comparison.check.passed ? "ok" : "DIFFERS");
   if (!comparison.check.passed) fmt::print("  not timed, because the results are wrong\n");
-  if (!comparison.secondsA.empty())
-    fmt::print("  A      {:<39} {:>13}  {}\n", comparison.a, rate(count, comparison.medianA()),
-               spread(comparison.secondsA, " s"));
-  if (!comparison.secondsB.empty()) {
-    fmt::print("  B      {:<39} {:>13}  {}\n", comparison.b, rate(count, comparison.medianB()),
-               spread(comparison.secondsB, " s"));
-    fmt::print("  B / A  {}\n", spread(comparison.ratios(), ""));
-  }
+  const auto contender = [&](char letter, const std::string& name, const std::vector<double>& seconds,
+                             const std::vector<double>& core) {
+    fmt::print("  {}      {:<39} {:>13}  {:<32}  {:.4g} core-s\n", letter, name, rate(count, median(seconds)),
+               spread(seconds, " s"), median(core));
+  };
+  if (!comparison.secondsA.empty()) contender('A', comparison.a, comparison.secondsA, comparison.coreA);
+  if (comparison.secondsB.empty()) return;
+  contender('B', comparison.b, comparison.secondsB, comparison.coreB);
+  fmt::print("  B / A  {}\n", spread(comparison.ratios(), ""));
 }
 
 void print(const Floor& floor) {
@@ -86,6 +91,8 @@ Json toJson(const Comparison& comparison) {
                {"ratio_max", nullptr},
                {"seconds_a", comparison.secondsA},
                {"seconds_b", comparison.secondsB},
+               {"core_seconds_a", comparison.coreA},
+               {"core_seconds_b", comparison.coreB},
                {"check", {{"text", comparison.check.text}, {"passed", comparison.check.passed}}}};
   if (!comparison.b.empty()) json["b"] = comparison.b;
   if (const std::vector<double> ratios = comparison.ratios(); !ratios.empty()) {
@@ -158,8 +165,8 @@ const Comparison* Bench::compare(const std::string& name, const std::string& uni
   progress.advance(1);
   comparison.check = check();
   for (int run = 0; run < options_.runs && comparison.check.passed; ++run) {
-    comparison.secondsA.push_back(secondsOf(a));
-    if (b) comparison.secondsB.push_back(secondsOf(*b));
+    time(a, comparison.secondsA, comparison.coreA);
+    if (b) time(*b, comparison.secondsB, comparison.coreB);
     progress.advance(1);
   }
   print(comparison);

@@ -41,7 +41,8 @@ struct Comparison {
   std::uint64_t count = 0;
   std::string a, b;
   BenchCheck check;
-  std::vector<double> secondsA, secondsB;
+  std::vector<double> secondsA, secondsB;  ///< wall clock
+  std::vector<double> coreA, coreB;        ///< the process' CPU time: what others' load on the machine disturbs least
 
   double medianA() const, medianB() const;
   /// secondsB / secondsA, pair by pair.
