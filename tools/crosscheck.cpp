@@ -50,9 +50,10 @@ LightDifference compareLight(const Frame& frame, std::size_t light, const Side& 
   LightDifference difference{frame.lightNames[light]};
   const std::vector<float>&a = host.lit.transmittance[light], &b = device.lit.transmittance[light];
   for (std::size_t slot = 0; slot < a.size(); ++slot) {
-    const double delta = std::abs(double(a[slot]) - double(b[slot]));
+    double delta = std::abs(double(a[slot]) - double(b[slot]));
+    if (!std::isfinite(delta)) delta = std::numeric_limits<double>::infinity();  // not a number on either side
     difference.mean += delta / static_cast<double>(a.size());
-    if (!(delta <= difference.worst)) difference.worst = delta, difference.particle = frame.tree.source[slot];
+    if (delta > difference.worst) difference.worst = delta, difference.particle = frame.tree.source[slot];
   }
   return difference;
 }

@@ -35,6 +35,8 @@ void expectBothTimed(const Json& run) {
   EXPECT_DOUBLE_EQ(run["ratio_median"].get<double>(), middle(ratios)) << run;
   EXPECT_DOUBLE_EQ(run["ratio_min"].get<double>(), *std::min_element(ratios.begin(), ratios.end())) << run;
   EXPECT_DOUBLE_EQ(run["ratio_max"].get<double>(), *std::max_element(ratios.begin(), ratios.end())) << run;
+  EXPECT_EQ(run["core_seconds_a"].size(), kRuns) << run;
+  EXPECT_EQ(run["core_seconds_b"].size(), kRuns) << run;
   EXPECT_TRUE(run["b"].is_string()) << run;
 }
 

@@ -132,9 +132,8 @@ std::vector<double> Comparison::ratios() const {
 
 Bench::Bench(const std::string& name, const BenchOptions& options, const CommonOptions& common)
     : name_(name), options_(options) {
-  if (!options.report.empty()) {
-    const OutputFile probe(options.report);
-  }  // before any work
+  // Before any work: an unwritable report must not cost a minute.
+  if (!options.report.empty()) OutputFile{options.report};
   std::string why;
   try {
     gpu_ = std::make_unique<Gpu>(deviceOptions(common));
@@ -184,8 +183,9 @@ int Bench::finish(std::uint64_t floorCount) {
     for (const Floor& floor : floors_) print(floor);
   }
   if (!options_.report.empty()) writeWholeFile(options_.report, reportJson());
-  return std::all_of(comparisons_.begin(), comparisons_.end(), [](const Comparison& c) { return c.check.passed; }) ? 0
-                                                                                                                   : 1;
+  const bool right =
+      std::all_of(comparisons_.begin(), comparisons_.end(), [](const Comparison& c) { return c.check.passed; });
+  return right ? 0 : 1;
 }
 
 std::string Bench::reportJson() const {
