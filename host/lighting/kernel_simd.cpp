@@ -90,10 +90,9 @@ HWY_INLINE void addBetween(const RayVectors& rays, const Particle& p, Depths& de
 }
 
 template <layout::uint kFalloff, layout::uint kEndpoint>
-HWY_NOINLINE Depths addNearEnd(const Packet& packet, const Rays& rays, const Particle& p, float radius,
-                               std::uint32_t slot, Depths depths) {
+HWY_INLINE void addNearEnd(const Packet& packet, const Rays& rays, const RayVectors& r, const Particle& p, float radius,
+                           std::uint32_t slot, Depths& depths) {
   const hn::RebindToUnsigned<Tag> slotTag;
-  const RayVectors r = loadRays(packet, rays);
   for (int v = 0; v < kVectors; ++v) {
     const Vec dx = hn::Sub(p.x, r.originX[v]), dy = hn::Sub(p.y, r.originY[v]), dz = hn::Sub(p.z, r.originZ[v]);
     const Vec vx = r.directionX[v], vy = r.directionY[v], vz = r.directionZ[v];
@@ -116,7 +115,6 @@ HWY_NOINLINE Depths addNearEnd(const Packet& packet, const Rays& rays, const Par
         hn::RebindMask(kTag, hn::Eq(hn::Load(slotTag, packet.self + v * kLanes), hn::Set(slotTag, slot)));
     depths.of[v] = hn::Add(depths.of[v], hn::IfThenZeroElse(isSelf, hn::Mul(p.peak, share)));
   }
-  return depths;
 }
 
 /// Bits of the lanes of kPacketRays particles from `slot` on: see Standing.
@@ -170,7 +168,7 @@ HWY_INLINE void addLeaf(const Octree& tree, std::uint32_t begin, std::uint32_t e
       if (bits.between >> bit & 1)
         addBetween<kFalloff>(vectors, particle, depths);
       else
-        depths = addNearEnd<kFalloff, kEndpoint>(packet, rays, particle, radius, slot, depths);
+        addNearEnd<kFalloff, kEndpoint>(packet, rays, vectors, particle, radius, slot, depths);
     }
   }
 }
