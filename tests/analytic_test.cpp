@@ -8,31 +8,12 @@
 #include "host/lighting/lighting.h"
 #include "host/lighting/medium.h"
 #include "tests/support/lighting_oracle.h"
+#include "tests/support/lights.h"
 
 namespace mote {
 namespace {
 
 constexpr layout::uint kFalloffs[] = {layout::kFalloffSmooth, layout::kFalloffLinear, layout::kFalloffSphere};
-
-layout::Light sunlight() {
-  return {.position = {},
-          .type = layout::kLightDirectional,
-          .direction = {0, 0, -1},
-          .decay = 0,
-          .power = vec3(1),
-          .shadowDensity = 1,
-          .castsShadows = 1};
-}
-
-layout::Light lamp(const vec3& position) {
-  return {.position = position,
-          .type = layout::kLightPoint,
-          .direction = {0, 0, -1},
-          .decay = 2,
-          .power = vec3(1),
-          .shadowDensity = 1,
-          .castsShadows = 1};
-}
 
 /// Equal particles: support radius, and cross-section that gives the peak.
 struct Kind {
@@ -94,8 +75,10 @@ TEST(Analytic, MeanOpticalDepthInABallDoesNotDependOnTheRadius) {
   const double crossSection = expected / (0.75 * kCount / (4.0 / 3.0 * kPi));
   for (const layout::uint falloff : kFalloffs) {
     const Kind once{falloff, 1.5 * spacing, crossSection}, twice{falloff, 3 * spacing, crossSection};
-    const double a = meanOpticalDepth(treeOf(position, once), sunlight(), falloff, layout::kEndpointSoft);
-    const double b = meanOpticalDepth(treeOf(position, twice), sunlight(), falloff, layout::kEndpointSoft);
+    const double a =
+        meanOpticalDepth(treeOf(position, once), directionalLight({0, 0, -1}), falloff, layout::kEndpointSoft);
+    const double b =
+        meanOpticalDepth(treeOf(position, twice), directionalLight({0, 0, -1}), falloff, layout::kEndpointSoft);
     std::printf("falloff %u: mean optical depth %.4f with r, %.4f with 2 r, expected %.4f\n", falloff, a, b, expected);
     EXPECT_NEAR(b / a, 1, 0.01);
     EXPECT_NEAR(a / expected, 1, 0.01);
@@ -109,8 +92,8 @@ TEST(Analytic, ClampedEndpointsCountWhatLiesBehind) {
   const double spacing = std::cbrt(4.0 / 3.0 * kPi / kCount);
   const Kind kind{layout::kFalloffSmooth, 1.5 * spacing, 4 / (0.75 * kCount / (4.0 / 3.0 * kPi))};
   const Octree tree = treeOf(position, kind);
-  const double soft = meanOpticalDepth(tree, sunlight(), kind.falloff, layout::kEndpointSoft);
-  const double clamp = meanOpticalDepth(tree, sunlight(), kind.falloff, layout::kEndpointClamp);
+  const double soft = meanOpticalDepth(tree, directionalLight({0, 0, -1}), kind.falloff, layout::kEndpointSoft);
+  const double clamp = meanOpticalDepth(tree, directionalLight({0, 0, -1}), kind.falloff, layout::kEndpointClamp);
   EXPECT_GT(clamp / soft, 1.005);
 }
 
@@ -197,7 +180,8 @@ void checkBall(std::size_t count, double radiusInSpacings, int realisations) {
         peak(count, static_cast<float>(kind.peak()));
     peak.resize(position.size(), 0.0f);
     const Octree tree = buildOctree(position, radius, peak);
-    const std::vector<float> depths = opticalDepths(tree, sunlight(), {falloff, layout::kEndpointSoft, 0});
+    const std::vector<float> depths =
+        opticalDepths(tree, directionalLight({0, 0, -1}), {falloff, layout::kEndpointSoft, 0});
     double sum = 0;
     for (std::size_t slot = 0; slot < depths.size(); ++slot)
       if (tree.source[slot] >= count) sum += std::exp(-depths[slot]);
@@ -262,7 +246,8 @@ TEST(Analytic, TransmittanceOfAPathIsTheProductOfItsParts) {
     peak[cloud.size()] = peak[cloud.size() + 1] = 0;  // probes
     const Octree tree = buildOctree(position, radius, peak);
     const auto depthTo = [&](const vec3& light, std::size_t particle) {
-      const std::vector<float> depths = opticalDepths(tree, lamp(light), {kind.falloff, layout::kEndpointSoft, 0});
+      const std::vector<float> depths =
+          opticalDepths(tree, pointLight(light), {kind.falloff, layout::kEndpointSoft, 0});
       for (std::size_t slot = 0; slot < depths.size(); ++slot)
         if (tree.source[slot] == particle) return double(depths[slot]);
       return -1.0;

@@ -8,6 +8,7 @@
 #include "host/lighting/lighting.h"
 #include "host/lighting/medium.h"
 #include "host/splat/splat.h"
+#include "tests/support/lights.h"
 
 namespace mote {
 namespace {
@@ -41,13 +42,7 @@ TEST_P(ViewEqualsLight, OnEveryPixelThatHasAProbeBehindTheCloud) {
       peak.push_back(0);
     }
   const Octree tree = buildOctree(position, radius, peak);
-  const layout::Light light{.position = eye,
-                            .type = layout::kLightPoint,
-                            .direction = {0, -1, 0},
-                            .decay = 2,
-                            .power = vec3(1),
-                            .shadowDensity = 1,
-                            .castsShadows = 1};
+  const layout::Light light = pointLight(eye);
   const std::vector<float> lit = transmittances(opticalDepths(tree, light, {falloff, layout::kEndpointSoft, 0}), light);
 
   std::vector<layout::SplatParticle> splats;

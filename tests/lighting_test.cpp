@@ -11,32 +11,13 @@
 #include "host/lighting/medium.h"
 #include "host/lighting/ray_order.h"
 #include "tests/support/lighting_oracle.h"
+#include "tests/support/lights.h"
 
 namespace mote {
 namespace {
 
 constexpr layout::uint kFalloffs[] = {layout::kFalloffSmooth, layout::kFalloffLinear, layout::kFalloffSphere};
 constexpr layout::uint kEndpoints[] = {layout::kEndpointSoft, layout::kEndpointClamp};
-
-layout::Light pointLight(const vec3& position) {
-  return {.position = position,
-          .type = layout::kLightPoint,
-          .direction = {0, -1, 0},
-          .decay = 2,
-          .power = vec3(1),
-          .shadowDensity = 1,
-          .castsShadows = 1};
-}
-
-layout::Light directionalLight(const vec3& direction) {
-  return {.position = {},
-          .type = layout::kLightDirectional,
-          .direction = glm::normalize(direction),
-          .decay = 0,
-          .power = vec3(1),
-          .shadowDensity = 1,
-          .castsShadows = 1};
-}
 
 struct Cloud {
   std::vector<vec3> position;

@@ -5,31 +5,13 @@
 #include "host/core/random.h"
 #include "host/lighting/medium.h"
 #include "tests/gpu/gpu_fixture.h"
+#include "tests/support/lights.h"
 
 namespace mote {
 namespace {
 
 constexpr layout::uint kFalloffs[] = {layout::kFalloffSmooth, layout::kFalloffLinear, layout::kFalloffSphere};
 constexpr layout::uint kEndpoints[] = {layout::kEndpointSoft, layout::kEndpointClamp};
-
-layout::Light pointLight(const vec3& position) {
-  return {.position = position,
-          .type = layout::kLightPoint,
-          .direction = {0, -1, 0},
-          .decay = 2,
-          .power = vec3(1),
-          .shadowDensity = 1,
-          .castsShadows = 1};
-}
-layout::Light directionalLight(const vec3& direction) {
-  return {.position = {},
-          .type = layout::kLightDirectional,
-          .direction = glm::normalize(direction),
-          .decay = 0,
-          .power = vec3(1),
-          .shadowDensity = 1,
-          .castsShadows = 1};
-}
 
 /// Uniform in the unit ball with log-uniform radii, some at equal positions, one at `light`.
 Octree ballTree(std::size_t count, double least, double greatest, double opticalDepth, layout::uint falloff,
