@@ -1,5 +1,4 @@
 // The particle files' part of `mote info`: statistics of raw channels, whatever their types.
-#include <Imath/half.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 
 #include "host/core/parallel.h"
 #include "host/particles/prt_reader.h"
+#include "host/particles/prt_visit.h"
 #include "host/particles/spacing.h"
 #include "tools/info.h"
 
@@ -26,25 +26,6 @@ T numberAt(const std::byte* from) {
   T value;
   std::memcpy(&value, from, sizeof value);
   return value;
-}
-
-/// Calls `body` with a value of the C++ type that stands for `type`.
-template <class Body>
-auto withType(PrtType type, const Body& body) {
-  switch (type) {
-    case PrtType::I16: return body(std::int16_t{});
-    case PrtType::I32: return body(std::int32_t{});
-    case PrtType::I64: return body(std::int64_t{});
-    case PrtType::F16: return body(Imath::half{});
-    case PrtType::F64: return body(double{});
-    case PrtType::U16: return body(std::uint16_t{});
-    case PrtType::U32: return body(std::uint32_t{});
-    case PrtType::U64: return body(std::uint64_t{});
-    case PrtType::I8: return body(std::int8_t{});
-    case PrtType::U8: return body(std::uint8_t{});
-    case PrtType::F32: break;
-  }
-  return body(float{});
 }
 
 /// What numbers of type T are compared and shown as: exact, so that 64-bit ids keep all their digits.
@@ -118,7 +99,7 @@ Json statisticsOf(const std::vector<std::byte>& raw, std::size_t count, std::uin
 
 Json channelJson(const PrtChannel& channel, const std::vector<std::byte>& raw, std::size_t count) {
   Json json = {{"name", channel.name}, {"type", prtTypeName(channel.type)}, {"arity", channel.arity}};
-  json.update(withType(channel.type, [&]<class T>(T) { return statisticsOf<T>(raw, count, channel.arity); }));
+  json.update(withPrtType(channel.type, [&]<class T>(T) { return statisticsOf<T>(raw, count, channel.arity); }));
   return json;
 }
 
@@ -148,7 +129,7 @@ Json metadataJson(const PrtHeader& header) {
     } else {
       const auto type = static_cast<PrtType>(m.type);
       Json values = Json::array();
-      withType(type, [&]<class T>(T) {
+      withPrtType(type, [&]<class T>(T) {
         for (std::size_t at = 0; at + sizeof(T) <= m.bytes.size(); at += sizeof(T))
           values.push_back(shown(numberAt<T>(reinterpret_cast<const std::byte*>(m.bytes.data()) + at)));
       });
@@ -258,7 +239,8 @@ void printParticles(const Json& info) {
                                                             valueText(radius["max"]), valueText(radius["mean"])));
   for (const Json& entry : info["metadata"]) {
     const auto channel = entry["channel"].get<std::string>();
-    fmt::print("  {:<23} {}\n", fmt::format("{}{}{}", channel, channel.empty() ? "" : ".", entry["name"].get<std::string>()),
+    fmt::print("  {:<23} {}\n",
+               fmt::format("{}{}{}", channel, channel.empty() ? "" : ".", entry["name"].get<std::string>()),
                metadataText(entry));
   }
 }

@@ -1,8 +1,8 @@
 // Sixteen rays that start in neighbouring slots, and the shaft that holds them all.
 //
-// The shaft is a capsule around one axis: every point of every ray lies within `spread` of the axis (box tests) and
-// within `tube` of the axis line (particle tests). What the shaft misses, no ray of the packet can hit, so one test
-// of the axis stands for sixteen: a node or particle is tested once, and only what passes meets all the rays.
+// The shaft surrounds one axis: no ray strays farther from it than where it starts, which `slabLow` and `slabHigh` hold
+// for box tests and `tube` for particle tests. What the shaft misses, no ray of the packet can hit, so one test of the
+// axis stands for sixteen: a node or particle is tested once, and only what passes meets all the rays.
 #pragma once
 #include <cstdint>
 
@@ -41,8 +41,8 @@ struct Packet {
   vec3 inverseStep;    ///< 1 / (axis vector), the vector to the light or, for directional, the unit direction
   float firstStep;     ///< start of the segment in that parameter, ≤ 0: the hindmost origin
   float lastStep;      ///< … and its end: 1, or +∞
-  vec3 slabLow;      ///< axisOrigin + spread: a slab's lower side, moved out by what the rays stray from the axis …
-  vec3 slabHigh;     ///< … axisOrigin − spread: its upper side
+  vec3 slabLow;        ///< axisOrigin + spread: a slab's lower side, moved out by what the rays stray from the axis …
+  vec3 slabHigh;       ///< … axisOrigin − spread: its upper side
   float tube;          ///< … and this near to the axis line
   float ahead;         ///< how far along the axis the foremost origin lies before axisOrigin, ≥ 0
   float behind;        ///< … and the hindmost behind it, ≥ 0
@@ -100,7 +100,7 @@ inline vec3 centreOf(const layout::Node& node) { return 0.5f * node.lo + 0.5f * 
     enter = std::max(enter, std::min(a, b));
     leave = std::min(leave, std::max(a, b));
   }
-  // The slack in `spread` covers rounding across the slabs; this covers it in the parameter itself.
+  // The slack in the slabs covers rounding across the slabs; this covers it in the parameter itself.
   return enter <= leave + 1e-6f * std::abs(leave);
 }
 

@@ -11,11 +11,10 @@
 #include <cstring>
 #include <new>
 
-#include <Imath/half.h>
-
 #include "host/core/error.h"
 #include "host/core/log.h"
 #include "host/particles/prt_header.h"
+#include "host/particles/prt_visit.h"
 
 namespace mote {
 namespace {
@@ -55,20 +54,7 @@ void convertColumn(const std::byte* from, std::size_t stride, std::size_t count,
 template <class To>
 void convertTyped(PrtType type, const std::byte* from, std::size_t stride, std::size_t count, int components,
                   bool broadcast, To* to) {
-  const auto run = [&]<class From>(From) { convertColumn<From>(from, stride, count, components, broadcast, to); };
-  switch (type) {
-    case PrtType::I16: return run(std::int16_t{});
-    case PrtType::I32: return run(std::int32_t{});
-    case PrtType::I64: return run(std::int64_t{});
-    case PrtType::F16: return run(Imath::half{});
-    case PrtType::F32: return run(float{});
-    case PrtType::F64: return run(double{});
-    case PrtType::U16: return run(std::uint16_t{});
-    case PrtType::U32: return run(std::uint32_t{});
-    case PrtType::U64: return run(std::uint64_t{});
-    case PrtType::I8: return run(std::int8_t{});
-    case PrtType::U8: return run(std::uint8_t{});
-  }
+  withPrtType(type, [&]<class From>(From) { convertColumn<From>(from, stride, count, components, broadcast, to); });
 }
 
 /// One request, resolved against the header.

@@ -152,6 +152,24 @@ TEST_F(MoteRender, StatsHaveTheKeysOfTheContract) {
   EXPECT_TRUE(frame["warnings"].is_array());
 }
 
+TEST_F(MoteRender, StatsHoldTheDevicesOwnSecondsOfEachStage) {
+  makeBall(folder_);
+  const ProcessResult result = test::mote({"render", scene_, "--lighting", "gpu", "--raster", "gpu", "--validate", "-o",
+                                           folder_.file("out.exr"), "--stats", folder_.file("stats.json")},
+                                          test::kOnLavapipe);
+  ASSERT_EQ(result.exitCode, 0) << result.err;
+  const json stats = json::parse(readBytes(folder_.file("stats.json")));
+  EXPECT_NE(stats["device"], "none");
+  const json& frame = stats["frames"][0];
+  for (const char* stage : {"lighting", "sort", "splat"}) {
+    ASSERT_TRUE(frame["device_seconds"].contains(stage)) << stage;
+    EXPECT_GT(frame["device_seconds"][stage], 0) << stage;
+    // The device works within the stage as the host sees it; a millisecond for the two clocks.
+    EXPECT_LE(frame["device_seconds"][stage], frame["seconds"][stage].get<double>() + 1e-3) << stage;
+  }
+  EXPECT_GT(frame["bytes"]["device"], 2000 * 20) << "the tree alone takes 20 bytes a particle";
+}
+
 TEST_F(MoteRender, PutsCameraFrameAndStatisticsIntoTheHeader) {
   makeBall(folder_);
   ASSERT_EQ(render({"-o", folder_.file("out.exr")}).exitCode, 0);
