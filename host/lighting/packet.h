@@ -6,6 +6,7 @@
 #pragma once
 #include <cstdint>
 
+#include "host/lighting/receivers.h"
 #include "host/octree/octree.h"
 #include "shaders/glsl/layout/light.h"
 
@@ -14,8 +15,6 @@ namespace mote {
 /// Rays a packet. Fixed, whatever the width of the vectors: decisions taken for a packet must not depend on the
 /// machine.
 constexpr int kPacketRays = 16;
-/// "No slot": a ray that starts at no particle leaves nothing out.
-constexpr std::uint32_t kNoSlot = 0xffffffffu;
 
 /// The rays as the kernels take them: relative to a base, near which they are exact. A particle at `p` is tested at
 /// p − base; the point of ray k nearest to the base is `origin`, and the ray's ends lie `before` and `after` from it.

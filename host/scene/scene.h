@@ -43,27 +43,40 @@ struct ParticleSource {
 enum class DensityMode { CrossSection, Peak };
 enum class Falloff { Smooth, Linear, Sphere };
 enum class Endpoint { Soft, Clamp };
+enum class PhaseType { Isotropic, HenyeyGreenstein, Rayleigh };
+
+struct Phase {
+  PhaseType type = PhaseType::Isotropic;
+  float g = 0;  ///< Henyey–Greenstein: mean cosine, −1 < g < 1, > 0 forward
+
+  bool operator==(const Phase&) const = default;
+};
 
 struct Medium {
   DensityMode densityMode = DensityMode::CrossSection;
   float densityScale = 1;             ///< ≥ 0
   std::optional<float> opticalDepth;  ///< instead of densityScale: mean τ of straight lines through the particles, > 0
   Falloff falloff = Falloff::Smooth;
-  vec3 albedo{0.95f};  ///< 0–1, multiplies Color
+  vec3 albedo{0.95f};   ///< 0–1, multiplies Color
+  vec3 extinction{1};   ///< ≥ 0, multiplies the extinction cross-section per channel
+  Phase phase;
+  float emissionScale = 1;  ///< ≥ 0, multiplies Emission
 
   bool operator==(const Medium&) const = default;
 };
 
-enum class LightType { Point, Directional };
+enum class LightType { Point, Spot, Directional };
 
 struct LightSource {
   std::string name;  ///< unique; letters, digits, '_' (it becomes a channel name)
   LightType type = LightType::Point;
-  vec3 position{0};          ///< point
-  vec3 direction{0, -1, 0};  ///< directional: of travel; unit length after parsing
+  vec3 position{0};          ///< point, spot
+  vec3 direction{0, -1, 0};  ///< directional, spot (from position to target): of travel; unit length after parsing
+  float innerAngle = 20;     ///< spot: half angle up to which it is at full strength [degrees], 0 ≤ inner ≤ outer
+  float outerAngle = 30;     ///< spot: half angle beyond which there is nothing [degrees], 0 < outer < 180
   vec3 color{1};             ///< ≥ 0
-  float strength = 1;        ///< point: intensity [W/sr]; directional: irradiance [W/m²]; ≥ 0
-  float decay = 2;           ///< point: 0–2
+  float strength = 1;        ///< point, spot: intensity [W/sr]; directional: irradiance [W/m²]; ≥ 0
+  float decay = 2;           ///< point, spot: 0–2
   float shadowDensity = 1;   ///< ≥ 0
   bool castsShadows = true;
 
@@ -76,23 +89,65 @@ struct LightingSettings {
   Backend backend = Backend::Auto;
   float cutoff = 1e-4f;  ///< 0 ≤ cutoff < 1: a ray may stop once its transmittance is below
   Endpoint endpoint = Endpoint::Soft;
+  float radiusScale = 1;               ///< > 0: factor on the radii that shadows are computed with (§4.6.4)
   std::uint32_t particlesPerCell = 0;  ///< 0: auto
+  float subsample = 1;         ///< share of the particles in the octree, 0 < share ≤ 1 (§4.6.3)
+  bool autoSubsample = false;  ///< true: the smallest share whose mean |ΔT| is within `error`
+  std::uint64_t subsampleSeed = 0;
+  bool compensate = true;         ///< the octree's particles stand for all: the total cross-section stays
+  float error = 0;                ///< 0: exact; else the mean |ΔT| that approximations must keep; 0–1
+  float solidShadowIntensity = 1; ///< 0–1: share of the light that a solid in its way takes (§4.6.2)
 
   bool operator==(const LightingSettings&) const = default;
 };
 
+enum class SolidMode { Shaded, Holdout, Hidden };
+
+/// A mesh that stands in the medium.
+struct Solid {
+  std::string pointer;  ///< where it stands in the scene, "/solids/0": the place of messages
+  std::string name;     ///< unique; letters, digits, '_'
+  std::string file;     ///< path as opened; may hold ####
+  SolidMode mode = SolidMode::Shaded;  ///< in the picture: Lambert; cut out of the medium; not at all
+  vec3 albedo{0.5f};                   ///< 0–1
+  bool castsShadows = true, receivesShadows = true;
+  vec3 translate{0}, rotate{0};  ///< as a particle source's
+  float scale = 1;               ///< > 0
+
+  bool operator==(const Solid&) const = default;
+};
+
+enum class Projection { Perspective, Orthographic };
+
+/// What the camera is at one frame; between keys it moves smoothly.
+struct CameraKey {
+  float frame = 1;
+  std::optional<vec3> position, target, up;
+  std::optional<float> fov, height, focusDistance;
+
+  bool operator==(const CameraKey&) const = default;
+};
+
 struct Camera {
+  Projection projection = Projection::Perspective;
   bool fitted = false;        ///< true: no position and no target given; fitDefaults() places it by the bounding box
   bool fittedDepths = false;  ///< true: fitted, and neither near nor far given; fitDefaults() sets both
   vec3 position{0, 1, 4}, target{0, 0.5f, 0}, up{0, 1, 0};
-  float fov = 40;                  ///< vertical, 0 < fov < 180
+  float fov = 40;                  ///< perspective: vertical, 0 < fov < 180
+  float height = 2;                ///< orthographic: of the picture [scene units], > 0; fitDefaults() may set it
   float near = 0.01f, far = 1000;  ///< depths; particles whose centre lies outside are not drawn
+  vec2 shutter{0};                 ///< opens and closes, relative to the frame's time [s]; open ≤ close
+  float apertureRadius = 0;        ///< of the lens [scene units], ≥ 0; 0: everything is sharp
+  std::optional<float> focusDistance;  ///< depth that is sharp [scene units], > 0; none: that of the target
+  std::vector<CameraKey> keys;         ///< ascending frames; empty: the camera stands still
 
   bool operator==(const Camera&) const = default;
 };
 
 struct View {
   Backend backend = Backend::Auto;
+  float radiusScale = 1;                   ///< > 0: factor on the radii that are drawn
+  std::string spriteColor, spriteOpacity;  ///< PNG or EXR over each splat, paths as opened; empty: none
 
   bool operator==(const View&) const = default;
 };
@@ -105,7 +160,9 @@ struct Output {
   ivec2 size{1280, 720};               ///< 1 … 16384 each
   Precision precision = Precision::Half;
   Compression compression = Compression::Zip;
-  bool depth = false;  ///< layer Z asked for in "aovs"
+  float pixelAspect = 1;  ///< width / height of a pixel, > 0
+  /// Layers asked for in "aovs".
+  bool depth = false, shadow = false, lights = false, velocity = false, opticalDepth = false;
 
   bool operator==(const Output&) const = default;
 };
@@ -124,6 +181,7 @@ struct Scene {
   bool defaultLights = false;  ///< true: the scene gave no "lights"; one key light is fitted to the bounding box
   std::vector<LightSource> lights;
   LightingSettings lighting;
+  std::vector<Solid> solids;
   Camera camera;
   View view;
   Output output;

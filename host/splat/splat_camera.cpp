@@ -35,6 +35,8 @@ layout::SplatCamera makeSplatCamera(const vec3& position, const vec3& target, co
   camera.imageSize = vec2(width, height);
   camera.halfExtent = 0.5f * camera.pixelSize * camera.imageSize;
   camera.minRadius = kMinSplatRadius;
+  camera.pixelAspect = 1;
+  camera.focusDistance = 1;
   return camera;
 }
 

@@ -30,12 +30,16 @@ struct SplatCamera {
   vec3 up;
   float far;        // … and above
   vec3 forward;
-  float pixelSize;  // edge of a pixel on the image plane at depth 1: (2·tan(fov/2)) / height
+  float pixelSize;  // height of a pixel on the image plane: (2·tan(fov/2)) / height at depth 1; orthographic [scene units]
   vec3 position;    // [scene units]
   uint falloff;     // kFalloff…
   vec2 halfExtent;  // half width and half height of the picture on the image plane at depth 1
   vec2 imageSize;   // [pixels]
   float minRadius;  // smallest splat radius [pixels]; below it the splat is stretched and its α scaled (opacity kept)
+  float pixelAspect;    // width / height of a pixel
+  uint orthographic;    // 1: rays are parallel, and the image plane's unit is the scene's
+  float apertureRadius; // of the lens [scene units]; 0: everything is sharp
+  float focusDistance;  // depth that is sharp [scene units], > 0
 };
 MOTE_ASSERT_OFFSET(SplatCamera, right, 0);
 MOTE_ASSERT_OFFSET(SplatCamera, near, 12);
@@ -48,7 +52,11 @@ MOTE_ASSERT_OFFSET(SplatCamera, falloff, 60);
 MOTE_ASSERT_OFFSET(SplatCamera, halfExtent, 64);
 MOTE_ASSERT_OFFSET(SplatCamera, imageSize, 72);
 MOTE_ASSERT_OFFSET(SplatCamera, minRadius, 80);
-MOTE_ASSERT_SIZE(SplatCamera, 84);
+MOTE_ASSERT_OFFSET(SplatCamera, pixelAspect, 84);
+MOTE_ASSERT_OFFSET(SplatCamera, orthographic, 88);
+MOTE_ASSERT_OFFSET(SplatCamera, apertureRadius, 92);
+MOTE_ASSERT_OFFSET(SplatCamera, focusDistance, 96);
+MOTE_ASSERT_SIZE(SplatCamera, 100);
 MOTE_LAYOUT_END
 
 #endif

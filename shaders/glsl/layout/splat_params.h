@@ -11,7 +11,7 @@ struct SplatParams {
 };
 MOTE_ASSERT_OFFSET(SplatParams, particles, 0);
 MOTE_ASSERT_OFFSET(SplatParams, camera, 8);
-MOTE_ASSERT_SIZE(SplatParams, 96);
+MOTE_ASSERT_SIZE(SplatParams, 112);
 MOTE_LAYOUT_END
 
 #endif

@@ -1,0 +1,24 @@
+// The points that light is computed for: every particle, and the surface points of solids.
+#pragma once
+#include <cstdint>
+#include <span>
+
+#include "host/core/vec.h"
+
+namespace mote {
+
+/// "No slot": a receiver that is no particle of the tree leaves nothing out of its sum.
+constexpr std::uint32_t kNoSlot = 0xffffffffu;
+
+/// Views of arrays that somebody else owns. Neighbours in the arrays should be neighbours in space (Morton order):
+/// packets are made of them.
+struct Receivers {
+  std::span<const float> x, y, z;       ///< where they are [scene units]; all of one length
+  std::span<const std::uint32_t> self;  ///< the tree's slot that each leaves out, or kNoSlot; empty: receiver k is slot k
+
+  std::size_t size() const { return x.size(); }
+  vec3 position(std::size_t k) const { return {x[k], y[k], z[k]}; }
+  std::uint32_t selfOf(std::size_t k) const { return self.empty() ? static_cast<std::uint32_t>(k) : self[k]; }
+};
+
+}  // namespace mote
