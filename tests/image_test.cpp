@@ -133,6 +133,44 @@ TEST(Exr, ChannelsHaveTheNamesAndTypesPromised) {
   EXPECT_EQ(channels(ExrPrecision::Float, true), "A:float B:float G:float R:float Z:float ");
 }
 
+/// A picture with every array that an Image may have, each number different.
+Image layered(int width, int height) {
+  Image image = noise(width, height, true);
+  const std::size_t pixels = image.pixels.size();
+  image.alpha.resize(pixels), image.opticalDepth.resize(pixels), image.velocity.resize(pixels);
+  image.layers = {{"light.key.R", std::vector<float>(pixels), true}, {"shadow.key", std::vector<float>(pixels), false}};
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const auto n = static_cast<float>(i);
+    image.alpha[i] = vec3(0.25f, 0.5f, 0.75f) + n;  // exact in half up to 512
+    image.opticalDepth[i] = n + 0.1f;
+    image.velocity[i] = vec2(n, -n - 0.3f);
+    image.layers[0].values[i] = n / 2;
+    image.layers[1].values[i] = n / 7;
+  }
+  return image;
+}
+
+TEST(Exr, LayersComeBackUnderTheirNamesMeasuresAsFloat) {
+  const TempFolder folder;
+  const Image image = layered(12, 9);
+  writeExr(folder.file("a.exr"), image, {.precision = ExrPrecision::Half});
+  std::string text;
+  for (const ExrChannel& c : exrChannels(folder.file("a.exr"))) text += c.name + ":" + c.type + " ";
+  EXPECT_EQ(text,
+            "A:half AB:half AG:half AR:half B:half G:half R:half Z:float light.key.R:half optical_depth:float "
+            "shadow.key:float velocity.x:float velocity.y:float ");
+  const Image back = readExr(folder.file("a.exr"));
+  EXPECT_TRUE(back.alpha == image.alpha);
+  EXPECT_TRUE(back.depth == image.depth);
+  EXPECT_TRUE(back.opticalDepth == image.opticalDepth);
+  EXPECT_TRUE(back.velocity == image.velocity);
+  ASSERT_EQ(back.layers.size(), 2u);  // in the file's order, by name
+  EXPECT_EQ(back.layers[0].name, "light.key.R");
+  EXPECT_TRUE(back.layers[0].values == image.layers[0].values);
+  EXPECT_EQ(back.layers[1].name, "shadow.key");
+  EXPECT_TRUE(back.layers[1].values == image.layers[1].values);
+}
+
 TEST(Exr, HeaderCarriesCompressionMatricesRateFrameAspectAndStrings) {
   const TempFolder folder;
   ExrOptions options;
@@ -264,6 +302,19 @@ TEST(ReadExr, DataWindowIsPlacedInTheDisplayWindow) {
       EXPECT_EQ(image.at(x, y), inside ? vec4(1, 0, 0, 1) : vec4(0)) << x << ' ' << y;
       EXPECT_EQ(image.depth[4 * y + x], inside ? 2 : kNoDepth) << x << ' ' << y;
     }
+}
+
+TEST(ReadExr, LayersArePlacedInTheDisplayWindowToo) {
+  const TempFolder folder;
+  writeForeign(folder.file("a.exr"), {"R", "other", "velocity.x"}, Imath::Box2i({0, 0}, {1, 1}),
+               Imath::Box2i({0, 0}, {3, 2}));
+  const Image image = readExr(folder.file("a.exr"));
+  ASSERT_EQ(image.layers.size(), 2u);  // velocity.x without velocity.y is a layer like any other
+  EXPECT_EQ(image.layers[0].name, "other");
+  EXPECT_EQ(image.layers[1].name, "velocity.x");
+  ASSERT_EQ(image.layers[0].values.size(), 12u);
+  EXPECT_EQ(image.layers[0].values[0], 2.0f);  // writeForeign numbers the channels from 1
+  EXPECT_EQ(image.layers[0].values[2], 0.0f);  // right of the data
 }
 
 TEST(ReadExr, RejectsWhatItCannotReadWithPathAndReason) {
@@ -516,6 +567,33 @@ TEST(Compare, NotFinitePixelsAreCountedAndLeftOut) {
   EXPECT_DOUBLE_EQ(d.channel[0].rmse, std::sqrt(0.25 / 2));  // the two finite pixels
   EXPECT_DOUBLE_EQ(d.overall.rmse, std::sqrt(0.25 / 8));
   EXPECT_DOUBLE_EQ(d.within, 0.25);
+}
+
+TEST(Compare, LayersAreHeldAgainstEachOtherByName) {
+  Image a = layered(4, 1), b = layered(4, 1);
+  EXPECT_TRUE(compareImages(a, b).onlyInOne.empty());
+  for (const LayerDifference& layer : compareImages(a, b).layers) {
+    EXPECT_EQ(layer.channel.max, 0) << layer.name;
+    EXPECT_EQ(layer.within, 1) << layer.name;
+  }
+  a.depth = {kNoDepth, kNoDepth, 3, 4};
+  b.depth = {kNoDepth, 2, 3, 4.5f};
+  b.layers[1].name = "shadow.rim";
+  b.opticalDepth[2] += 0.25f;
+  const ImageDifference d = compareImages(a, b);
+  EXPECT_EQ(d.onlyInOne, (std::vector<std::string>{"shadow.key", "shadow.rim"}));
+  const auto layer = [&](const std::string& name) {
+    for (const LayerDifference& l : d.layers)
+      if (l.name == name) return l;
+    return LayerDifference{};
+  };
+  EXPECT_EQ(layer("Z").unmatched, 1u);
+  EXPECT_EQ(layer("Z").within, 0.5);
+  EXPECT_EQ(layer("Z").channel.max, 0.5);
+  EXPECT_EQ(layer("optical_depth").within, 0.75);
+  EXPECT_NEAR(layer("optical_depth").channel.max, 0.25, 1e-6);
+  EXPECT_EQ(layer("optical_depth").channel.maxX, 2);
+  EXPECT_SAYS(differenceJson(d), "\"optical_depth\"");
 }
 
 TEST(Compare, DifferentSizesAreRefusedWithBoth) {

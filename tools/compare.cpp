@@ -28,6 +28,10 @@ std::vector<std::string> failures(const ImageDifference& d, const CompareOptions
   if (!(d.within >= options.minWithin))
     found.push_back(fmt::format("{:.4f} % of the pixels are within 2/255, less than {:g} %", 100 * d.within,
                                 100 * options.minWithin));
+  for (const LayerDifference& layer : d.layers)
+    if (!(layer.within >= options.minWithin))
+      found.push_back(fmt::format("{}: {:.4f} % of the pixels are within 2/255, less than {:g} %", layer.name,
+                                  100 * layer.within, 100 * options.minWithin));
   if (d.overall.notFinite > 0)
     found.push_back(fmt::format("{} pixels are not finite and so cannot be compared", d.overall.notFinite));
   return found;
@@ -36,12 +40,17 @@ std::vector<std::string> failures(const ImageDifference& d, const CompareOptions
 void printDifference(const ImageDifference& d) {
   fmt::print("{} × {} pixels\n", d.width, d.height);
   fmt::print("{:<8}{:>12}{:>12}{:>12}   at\n", "", "RMSE", "mean", "max");
-  const auto row = [](const char* name, const ChannelDifference& c) {
+  const auto row = [](const std::string& name, const ChannelDifference& c) {
     fmt::print("{:<8}{:>12.3e}{:>12.3e}{:>12.3e}   {}, {}\n", name, c.rmse, c.mean, c.max, c.maxX, c.maxY);
   };
   const char* const names[] = {"R", "G", "B", "A"};
   for (int c = 0; c < 4; ++c) row(names[c], d.channel[c]);
   row("all", d.overall);
+  for (const LayerDifference& layer : d.layers) {
+    row(layer.name, layer.channel);
+    if (layer.unmatched > 0) fmt::print("{:<8}{} pixels have it in one picture only\n", "", layer.unmatched);
+  }
+  for (const std::string& name : d.onlyInOne) fmt::print("only one picture has the channel {}\n", name);
   fmt::print("PSNR {}, within 2/255: {:.4f} % of the pixels\n",
              std::isfinite(d.psnr) ? fmt::format("{:.1f} dB", d.psnr) : "infinite (no difference)", 100 * d.within);
 }

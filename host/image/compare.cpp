@@ -1,9 +1,11 @@
 #include "host/image/compare.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "host/core/error.h"
+#include "host/image/channels.h"
 #include "host/image/png.h"
 
 namespace mote {
@@ -30,6 +32,46 @@ struct Sums {
     return result;
   }
 };
+
+LayerDifference compareLayer(const ChannelView& a, const ChannelView& b, int width, std::size_t pixels) {
+  LayerDifference layer{.name = a.name};
+  Sums sums;
+  std::size_t within = 0;
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const float p = a.at(i), q = b.at(i);
+    if (a.empty != 0 && (p == a.empty) != (q == a.empty)) {
+      ++layer.unmatched;
+      continue;
+    }
+    const double difference = p == q ? 0 : std::fabs(double(p) - double(q));
+    if (!std::isfinite(difference)) {
+      ++sums.result.notFinite;
+      continue;
+    }
+    sums.add(difference, static_cast<int>(i % static_cast<std::size_t>(width)),
+             static_cast<int>(i / static_cast<std::size_t>(width)));
+    within += difference <= kPixelTolerance * std::max(1.0, std::fabs(double(p)));
+  }
+  layer.channel = sums.finish();
+  if (pixels > 0) layer.within = double(within) / double(pixels);
+  return layer;
+}
+
+void compareLayers(const Image& a, const Image& b, ImageDifference& out) {
+  const std::vector<ChannelView> first = channelsOf(a), second = channelsOf(b);
+  const auto find = [](const std::vector<ChannelView>& in, const std::string& name) {
+    return std::find_if(in.begin(), in.end(), [&](const ChannelView& view) { return view.name == name; });
+  };
+  for (std::size_t c = 4; c < first.size(); ++c) {  // R G B A come first
+    const auto twin = find(second, first[c].name);
+    if (twin == second.end())
+      out.onlyInOne.push_back(first[c].name);
+    else
+      out.layers.push_back(compareLayer(first[c], *twin, a.width, a.pixels.size()));
+  }
+  for (const ChannelView& view : second)
+    if (find(first, view.name) == first.end()) out.onlyInOne.push_back(view.name);
+}
 
 nlohmann::json jsonOf(const ChannelDifference& c) {
   return {
@@ -65,6 +107,7 @@ ImageDifference compareImages(const Image& a, const Image& b) {
   out.overall = all.finish();
   if (!a.pixels.empty()) out.within = double(within) / double(a.pixels.size());
   out.psnr = -20 * std::log10(out.overall.rmse);
+  compareLayers(a, b, out);
   return out;
 }
 
@@ -78,6 +121,12 @@ std::string differenceJson(const ImageDifference& d) {
   json["psnr"] = std::isfinite(d.psnr) ? nlohmann::ordered_json(d.psnr) : nlohmann::ordered_json(nullptr);
   const char* const names[] = {"R", "G", "B", "A"};
   for (int c = 0; c < 4; ++c) json["channels"][names[c]] = jsonOf(d.channel[c]);
+  for (const LayerDifference& layer : d.layers) {
+    json["channels"][layer.name] = jsonOf(layer.channel);
+    json["channels"][layer.name]["unmatched"] = layer.unmatched;
+    json["channels"][layer.name]["within"] = layer.within;
+  }
+  json["only_in_one"] = d.onlyInOne;
   return json.dump(2) + "\n";
 }
 

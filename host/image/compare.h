@@ -5,6 +5,7 @@
 // it is not "within".
 #pragma once
 #include <string>
+#include <vector>
 
 #include "host/image/image.h"
 
@@ -20,15 +21,26 @@ struct ChannelDifference {
   std::size_t notFinite = 0;  ///< pixels where a or b is not finite in this channel
 };
 
-struct ImageDifference {
-  int width = 0, height = 0;
-  ChannelDifference channel[4];  ///< R G B A
-  ChannelDifference overall;     ///< over all four channels' values; notFinite: pixels with any
-  double within = 1;             ///< share of all pixels whose R, G, B and A each differ by ≤ kPixelTolerance
-  double psnr = 0;               ///< [dB] −20·log10(overall.rmse), peak value 1; +∞ for equal pictures
+/// One channel beyond R G B A that both pictures have. Pixels without a surface or medium (Z of kNoDepth) in exactly
+/// one picture count as `unmatched` and are left out of the errors; those without in both are equal.
+struct LayerDifference {
+  std::string name;
+  ChannelDifference channel{};
+  std::size_t unmatched = 0;
+  double within = 1;  ///< share of all pixels that match and differ by ≤ kPixelTolerance · max(1, |a|)
 };
 
-/// Throws InputError when the sizes differ. Depth is not compared. About 0.01 s a million pixels.
+struct ImageDifference {
+  int width = 0, height = 0;
+  ChannelDifference channel[4];         ///< R G B A
+  ChannelDifference overall;            ///< over all four channels' values; notFinite: pixels with any
+  double within = 1;                    ///< share of all pixels whose R, G, B and A each differ by ≤ kPixelTolerance
+  std::vector<LayerDifference> layers;  ///< in the first picture's order
+  std::vector<std::string> onlyInOne;   ///< names of channels that only one of the pictures has
+  double psnr = 0;                      ///< [dB] −20·log10(overall.rmse), peak value 1; +∞ for equal pictures
+};
+
+/// Throws InputError when the sizes differ. About 0.01 s a million pixels and four channels.
 ImageDifference compareImages(const Image& a, const Image& b);
 
 /// The same as a JSON object; a PSNR of equal pictures is null there.

@@ -1,7 +1,8 @@
 // OpenEXR 3.1 files: Mote's pictures out, and any single-part picture in.
 //
-// Written: channels R G B A (half or float, linear, premultiplied) and, where the image has depth, Z (always float:
-// half has 11 digits, too few for distances). One part, scan lines from the top, data window = display window, no time
+// Written: channels R G B A and, as far as the image has them, AR AG AB and layers of radiance (half or float, linear,
+// premultiplied), Z, optical_depth, velocity.x, velocity.y and other layers (always float: half has 11 digits, too few
+// for distances). channels.h has the names. One part, scan lines from the top, data window = display window, no time
 // stamps: the same input gives the same bytes, whatever the number of threads.
 #pragma once
 #include <map>
@@ -38,9 +39,9 @@ struct ExrOptions {
 void writeExr(const std::string& path, const Image& image, const ExrOptions& options);
 
 /// Reads R G B A Z of any pixel type; a picture of the display window. Missing colours are 0 (a lone Y is grey),
-/// missing A is 1, missing Z leaves `depth` empty. Outside the data window everything is 0 and Z is kNoDepth. Throws
-/// InputError when the file is missing, is no OpenEXR file, is damaged or cut short, has none of these channels,
-/// subsamples them, or claims more than 16384 × 16384 pixels.
+/// missing A is 1, missing Z leaves `depth` empty; channels without a place of their own become layers. Outside the
+/// data window everything is 0 and Z is kNoDepth. Throws InputError when the file is missing, is no OpenEXR file, is
+/// damaged or cut short, has none of these channels, subsamples them, or claims more than 16384 × 16384 pixels.
 Image readExr(const std::string& path);
 
 /// Every string attribute of the header. Throws InputError as readExr.

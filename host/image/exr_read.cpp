@@ -12,12 +12,14 @@
 #include <new>
 
 #include "host/core/error.h"
+#include "host/image/channels.h"
 #include "host/image/exr.h"
 
 namespace mote {
 namespace {
 
 constexpr std::int64_t kMaxPixels = std::int64_t{16384} * 16384;  // as large as Mote writes; 4 GiB in memory
+constexpr std::int64_t kMaxNumbers = 16 * kMaxPixels;
 
 /// Calls body(file) with the opened file and turns everything OpenEXR throws into one InputError.
 template <class Body>
@@ -55,32 +57,37 @@ void checkSize(const std::string& path, const char* field, const Window& window)
 
 const char* typeName(Imf::PixelType type) { return type == Imf::HALF ? "half" : type == Imf::FLOAT ? "float" : "uint"; }
 
-/// Which of the file's channels fill RGBA and Z.
+/// The file's channels by name, as an Image takes them.
 struct Layout {
-  bool colour[4] = {};  // R G B A
-  bool grey = false, depth = false;
+  std::vector<std::string> names;
+  bool grey = false;  ///< a lone Y instead of colours
 
   Layout(const std::string& path, const Imf::ChannelList& channels) {
-    const char* const names[] = {"R", "G", "B", "A"};
-    for (int c = 0; c < 4; ++c) colour[c] = has(path, channels, names[c]);
-    grey = !colour[0] && !colour[1] && !colour[2] && has(path, channels, "Y");
-    depth = has(path, channels, "Z");
-    if (colour[0] || colour[1] || colour[2] || colour[3] || grey || depth) return;
-    std::string names_;
-    for (auto c = channels.begin(); c != channels.end(); ++c)
-      names_ += fmt::format("{}{}", names_.empty() ? "" : ", ", c.name());
-    throw InputError(path, "channels", "at least one of R, G, B, A, Y, Z", names_.empty() ? "none" : names_);
-  }
-
- private:
-  static bool has(const std::string& path, const Imf::ChannelList& channels, const char* name) {
-    const Imf::Channel* channel = channels.findChannel(name);
-    if (channel && (channel->xSampling != 1 || channel->ySampling != 1))
-      throw InputError(path, fmt::format("channel {}", name), "a sample for every pixel",
-                       fmt::format("one for {} × {} pixels", channel->xSampling, channel->ySampling));
-    return channel != nullptr;
+    std::string all;
+    bool known = false;
+    for (auto c = channels.begin(); c != channels.end(); ++c) {
+      const std::string name = c.name();
+      all += (all.empty() ? "" : ", ") + name;
+      known = known || name == "R" || name == "G" || name == "B" || name == "A" || name == "Y" || name == "Z";
+      if (c.channel().xSampling != 1 || c.channel().ySampling != 1)
+        throw InputError(path, fmt::format("channel {}", name), "a sample for every pixel",
+                         fmt::format("one for {} × {} pixels", c.channel().xSampling, c.channel().ySampling));
+      names.push_back(name);
+    }
+    if (!known) throw InputError(path, "channels", "at least one of R, G, B, A, Y, Z", all.empty() ? "none" : all);
+    const auto has = [&](const char* name) { return channels.findChannel(name) != nullptr; };
+    grey = !has("R") && !has("G") && !has("B") && has("Y");
+    if (grey) std::erase(names, "Y");
   }
 };
+
+/// A file of a few bytes may claim thousands of channels.
+void checkBytes(const std::string& path, const Layout& layout, std::int64_t pixels) {
+  const auto channels = static_cast<std::int64_t>(layout.names.size());
+  if (channels > kMaxNumbers / pixels)
+    throw InputError(path, "channels", fmt::format("at most {} numbers in all", kMaxNumbers),
+                     fmt::format("{} channels of {} pixels", channels, pixels));
+}
 
 /// Slice of float values; `base` is that of the data window's first pixel.
 Imf::Slice sliceOf(float* base, std::size_t xStride, const Window& data, double fill) {
@@ -92,17 +99,13 @@ Imf::Slice sliceOf(float* base, std::size_t xStride, const Window& data, double 
 }
 
 Image readDataWindow(Imf::InputFile& file, const Layout& layout, const Window& data) {
-  Image image(static_cast<int>(data.width), static_cast<int>(data.height), layout.depth);
+  Image image = imageWith(static_cast<int>(data.width), static_cast<int>(data.height), layout.names);
   Imf::FrameBuffer buffer;
-  float* const first = &image.pixels[0].x;
-  if (layout.grey) {
-    buffer.insert("Y", sliceOf(first, sizeof(vec4), data, 0));
-    buffer.insert("A", sliceOf(first + 3, sizeof(vec4), data, 1));
-  } else {
-    const char* const names[] = {"R", "G", "B", "A"};
-    for (int c = 0; c < 4; ++c) buffer.insert(names[c], sliceOf(first + c, sizeof(vec4), data, c == 3 ? 1 : 0));
+  for (const ChannelView& channel : channelsOf(image)) {
+    // A grey picture's Y goes through R, and what it leaves of G and B is filled in below.
+    const std::string name = layout.grey && channel.name == "R" ? "Y" : channel.name;
+    buffer.insert(name, sliceOf(channel.first, channel.stride * sizeof(float), data, name == "A" ? 1 : channel.empty));
   }
-  if (layout.depth) buffer.insert("Z", sliceOf(image.depth.data(), sizeof(float), data, kNoDepth));
   file.setFrameBuffer(buffer);
   const int top = static_cast<int>(data.top);
   file.readPixels(top, top + image.height - 1);
@@ -112,16 +115,15 @@ Image readDataWindow(Imf::InputFile& file, const Layout& layout, const Window& d
 }
 
 /// The part of `image`, which stands at `data`, that shows in `display`; nothing elsewhere.
-Image place(const Image& image, const Window& data, const Window& display) {
-  Image out(static_cast<int>(display.width), static_cast<int>(display.height), !image.depth.empty());
+Image place(const Image& image, const Layout& layout, const Window& data, const Window& display) {
+  Image out = imageWith(static_cast<int>(display.width), static_cast<int>(display.height), layout.names);
   const std::int64_t dx = data.left - display.left, dy = data.top - display.top;
-  for (std::int64_t y = std::max<std::int64_t>(0, dy); y < std::min(display.height, dy + data.height); ++y)
-    for (std::int64_t x = std::max<std::int64_t>(0, dx); x < std::min(display.width, dx + data.width); ++x) {
-      const auto from = static_cast<std::size_t>((y - dy) * data.width + (x - dx));
-      const auto to = static_cast<std::size_t>(y * display.width + x);
-      out.pixels[to] = image.pixels[from];
-      if (!out.depth.empty()) out.depth[to] = image.depth[from];
-    }
+  const std::vector<ChannelView> sources = channelsOf(image), targets = channelsOf(out);
+  for (std::size_t c = 0; c < targets.size(); ++c)
+    for (std::int64_t y = std::max<std::int64_t>(0, dy); y < std::min(display.height, dy + data.height); ++y)
+      for (std::int64_t x = std::max<std::int64_t>(0, dx); x < std::min(display.width, dx + data.width); ++x)
+        targets[c].at(static_cast<std::size_t>(y * display.width + x)) =
+            sources[c].at(static_cast<std::size_t>((y - dy) * data.width + (x - dx)));
   return out;
 }
 
@@ -133,10 +135,11 @@ Image readExr(const std::string& path) {
     checkSize(path, "dataWindow", data);
     checkSize(path, "displayWindow", display);
     const Layout layout(path, file.header().channels());
+    checkBytes(path, layout, std::max(data.width * data.height, display.width * display.height));
     Image image = readDataWindow(file, layout, data);
     const bool same = data.left == display.left && data.top == display.top && data.width == display.width &&
                       data.height == display.height;
-    return same ? image : place(image, data, display);
+    return same ? image : place(image, layout, data, display);
   });
 }
 

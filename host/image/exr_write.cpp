@@ -23,6 +23,7 @@
 #include "host/core/log.h"
 #include "host/core/output_file.h"
 #include "host/core/parallel.h"
+#include "host/image/channels.h"
 #include "host/image/exr.h"
 
 namespace mote {
@@ -86,12 +87,15 @@ Imath::M44f matrixOf(const mat4& m) {  // glm's columns are OpenEXR's rows, see 
   return out;
 }
 
-Imf::Header headerOf(const Image& image, const ExrOptions& options) {
+Imf::PixelType typeOf(const ChannelView& channel, const ExrOptions& options) {
+  return channel.colour && options.precision == ExrPrecision::Half ? Imf::HALF : Imf::FLOAT;
+}
+
+Imf::Header headerOf(const Image& image, const std::vector<ChannelView>& channels, const ExrOptions& options) {
   Imf::Header header(image.width, image.height, options.pixelAspectRatio);
   header.compression() = compressionOf(options.compression);
-  const Imf::PixelType colour = options.precision == ExrPrecision::Half ? Imf::HALF : Imf::FLOAT;
-  for (const char* name : {"R", "G", "B", "A"}) header.channels().insert(name, Imf::Channel(colour));
-  if (!image.depth.empty()) header.channels().insert("Z", Imf::Channel(Imf::FLOAT));
+  for (const ChannelView& channel : channels)
+    header.channels().insert(channel.name, Imf::Channel(typeOf(channel, options)));
   if (options.worldToCamera) Imf::addWorldToCamera(header, matrixOf(*options.worldToCamera));
   if (options.worldToNDC) Imf::addWorldToNDC(header, matrixOf(*options.worldToNDC));
   if (options.framesPerSecond) Imf::addFramesPerSecond(header, Imf::guessExactFps(*options.framesPerSecond));
@@ -100,38 +104,27 @@ Imf::Header headerOf(const Image& image, const ExrOptions& options) {
   return header;
 }
 
-struct HalfPixel {
-  Imath::half channel[4];
-};
-
 /// Also counts the values that half cannot hold.
-std::vector<HalfPixel> toHalf(const std::vector<vec4>& pixels, std::size_t& clamped) {
-  std::vector<HalfPixel> out(pixels.size());
-  std::atomic<std::size_t> count{0};
-  parallelBlocks(pixels.size(), 65536, [&](std::size_t begin, std::size_t end) {
+std::vector<Imath::half> toHalf(const ChannelView& channel, std::size_t pixels, std::atomic<std::size_t>& clamped) {
+  std::vector<Imath::half> out(pixels);
+  parallelBlocks(pixels, 65536, [&](std::size_t begin, std::size_t end) {
     std::size_t mine = 0;
-    for (std::size_t i = begin; i < end; ++i)
-      for (int c = 0; c < 4; ++c) {
-        float value = pixels[i][c];
-        if (std::fabs(value) > kHalfMax) value = std::copysign(kHalfMax, value), ++mine;
-        out[i].channel[c] = Imath::half(value);
-      }
-    count += mine;
+    for (std::size_t i = begin; i < end; ++i) {
+      float value = channel.at(i);
+      if (std::fabs(value) > kHalfMax) value = std::copysign(kHalfMax, value), ++mine;
+      out[i] = Imath::half(value);
+    }
+    clamped += mine;
   });
-  clamped = count;
   return out;
 }
 
-/// Slices over interleaved RGBA; OpenEXR only reads through them, whatever its type says.
-template <class Channel>
-Imf::FrameBuffer colourSlices(const Channel* first, Imf::PixelType type, int width) {
-  Imf::FrameBuffer buffer;
-  constexpr std::size_t kPixel = 4 * sizeof(Channel);
-  const char* const names[] = {"R", "G", "B", "A"};
-  for (std::size_t c = 0; c < 4; ++c)
-    buffer.insert(names[c], Imf::Slice(type, reinterpret_cast<char*>(const_cast<Channel*>(first + c)), kPixel,
-                                       kPixel * static_cast<std::size_t>(width)));
-  return buffer;
+/// OpenEXR only reads through it, whatever its type says.
+template <class Number>
+Imf::Slice sliceOf(const Number* first, std::size_t stride, Imf::PixelType type, int width) {
+  const std::size_t xStride = stride * sizeof(Number);
+  return Imf::Slice(type, reinterpret_cast<char*>(const_cast<Number*>(first)), xStride,
+                    xStride * static_cast<std::size_t>(width));
 }
 
 }  // namespace
@@ -142,23 +135,21 @@ void writeExr(const std::string& path, const Image& image, const ExrOptions& opt
   MOTE_CHECK(image.pixels.size(), ==, std::size_t(image.width) * image.height);
   OutputFile file(path);  // first: a wrong path is reported before any work
 
-  std::size_t clamped = 0;
-  std::vector<HalfPixel> halves;
+  const std::vector<ChannelView> channels = channelsOf(image);
+  std::atomic<std::size_t> clamped{0};
+  std::vector<std::vector<Imath::half>> halves;  // one for each channel that is stored so
   Imf::FrameBuffer buffer;
-  if (options.precision == ExrPrecision::Half) {
-    halves = toHalf(image.pixels, clamped);
-    buffer = colourSlices(halves[0].channel, Imf::HALF, image.width);
-  } else {
-    buffer = colourSlices(&image.pixels[0].x, Imf::FLOAT, image.width);
-  }
-  if (!image.depth.empty()) {
-    MOTE_CHECK(image.depth.size(), ==, image.pixels.size());
-    buffer.insert("Z", Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(image.depth.data())),
-                                  sizeof(float), sizeof(float) * static_cast<std::size_t>(image.width)));
+  for (const ChannelView& channel : channels) {
+    if (typeOf(channel, options) == Imf::HALF) {
+      halves.push_back(toHalf(channel, image.pixels.size(), clamped));
+      buffer.insert(channel.name, sliceOf(halves.back().data(), 1, Imf::HALF, image.width));
+    } else {
+      buffer.insert(channel.name, sliceOf(channel.first, channel.stride, Imf::FLOAT, image.width));
+    }
   }
   if (clamped > 0)
     logWarning(fmt::format("{}: {} values beyond half's range were clamped to {}; \"precision\": \"float\" keeps them",
-                           path, clamped, kHalfMax));
+                           path, clamped.load(), kHalfMax));
 
   CheckedStream stream(file);
   std::string reason;
@@ -166,7 +157,7 @@ void writeExr(const std::string& path, const Image& image, const ExrOptions& opt
     // Blocks are compressed on `threads` threads and written in order by this one.
     const int threads = static_cast<int>(threadCount());
     if (threads > 1 && Imf::globalThreadCount() == 0) Imf::setGlobalThreadCount(threads);
-    Imf::OutputFile exr(stream, headerOf(image, options), threads > 1 ? threads : 0);
+    Imf::OutputFile exr(stream, headerOf(image, channels, options), threads > 1 ? threads : 0);
     exr.setFrameBuffer(buffer);
     exr.writePixels(image.height);
   } catch (const std::exception& e) {

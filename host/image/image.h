@@ -15,6 +15,7 @@ constexpr float kNoDepth = 1e10f;
 struct ImageLayer {
   std::string name;
   std::vector<float> values;  ///< width × height
+  bool colour = false;        ///< radiance: stored in the picture's precision; else always as float
 };
 
 /// Rows from the top, pixels from the left. Colour is linear and premultiplied.
