@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "host/core/error.h"
+#include "host/scene/camera_path.h"
 
 namespace mote {
 namespace {
@@ -15,6 +16,7 @@ namespace {
 constexpr double kElevation = 15 * kPi / 180;
 constexpr double kFilled = 0.9;         // share of the picture's width or height that the box takes
 constexpr double kLeastDistance = 1.5;  // of the camera, in radii of the box: it never stands inside
+constexpr double kLeastHeight = 0.1;    // of an orthographic picture, in radii: a line seen from its end has no height
 constexpr double kLightDistance = 3;    // in radii: far enough that one side is not lit much more than the other
 
 struct Box {
@@ -40,22 +42,54 @@ dvec3 front(const dvec3& up) {
   return glm::normalize(usual - glm::dot(usual, up) * up);
 }
 
-void fitCamera(Camera& camera, const ivec2& size, const Box& box) {
+/// Width / height of the picture as it is seen.
+double aspectOf(const Output& output) {
+  return static_cast<double>(output.pixelAspect) * output.size.x / output.size.y;
+}
+
+/// The direction from the box to the camera, and what is right and up in the picture.
+struct Axes {
+  dvec3 toCamera, right, up;
+};
+
+Axes axesOf(const Camera& camera) {
   const dvec3 worldUp = glm::normalize(dvec3(camera.up));
   const dvec3 toCamera = std::cos(kElevation) * front(worldUp) + std::sin(kElevation) * worldUp;
-  const dvec3 right = glm::normalize(glm::cross(worldUp, toCamera)), up = glm::cross(toCamera, right);
-  const double tanY = std::tan(0.5 * static_cast<double>(camera.fov) * kPi / 180);
-  const double tanX = tanY * size.x / size.y;
+  const dvec3 right = glm::normalize(glm::cross(worldUp, toCamera));
+  return {toCamera, right, glm::cross(toCamera, right)};
+}
+
+/// From the box's centre, so that all of it is in a perspective picture.
+double distanceOf(const Axes& axes, const Box& box, float fov, double aspect) {
+  const double tanY = std::tan(0.5 * static_cast<double>(fov) * kPi / 180), tanX = tanY * aspect;
   // A corner at (x, y, z) from the centre is seen at depth d − z; it is inside where |x| ≤ tan · (d − z).
   double distance = kLeastDistance * box.radius;
   for (const dvec3& corner : box.corners) {
     const dvec3 offset = corner - box.centre;
-    const double z = glm::dot(offset, toCamera);
-    distance = std::max({distance, z + std::abs(glm::dot(offset, right)) / (kFilled * tanX),
-                         z + std::abs(glm::dot(offset, up)) / (kFilled * tanY)});
+    const double z = glm::dot(offset, axes.toCamera);
+    distance = std::max({distance, z + std::abs(glm::dot(offset, axes.right)) / (kFilled * tanX),
+                         z + std::abs(glm::dot(offset, axes.up)) / (kFilled * tanY)});
   }
+  return distance;
+}
+
+/// Of an orthographic picture, so that all of the box is in it.
+double heightOf(const Axes& axes, const Box& box, double aspect) {
+  double half = 0.5 * kLeastHeight * box.radius;
+  for (const dvec3& corner : box.corners) {
+    const dvec3 offset = corner - box.centre;
+    half = std::max({half, std::abs(glm::dot(offset, axes.right)) / aspect, std::abs(glm::dot(offset, axes.up))});
+  }
+  return 2 * half / kFilled;
+}
+
+void fitCamera(Camera& camera, double aspect, const Box& box) {
+  const Axes axes = axesOf(camera);
+  const bool perspective = camera.projection == Projection::Perspective;
+  const double distance = perspective ? distanceOf(axes, box, camera.fov, aspect) : 2 * kLeastDistance * box.radius;
   camera.target = vec3(box.centre);
-  camera.position = vec3(box.centre + distance * toCamera);
+  camera.position = vec3(box.centre + distance * axes.toCamera);
+  if (camera.fittedHeight) camera.height = static_cast<float>(heightOf(axes, box, aspect));
   if (!camera.fittedDepths) return;
   // The nearest corner is at distance/3 or more: generous to both sides, and a depth range that floats resolve.
   camera.near = static_cast<float>(0.01 * distance);
@@ -83,9 +117,11 @@ void fitDefaults(Scene& scene, const Bounds& supportBounds) {
   MOTE_CHECK(supportBounds.empty(), ==, false);
   const Box box = boxOf(supportBounds);
   MOTE_CHECK(std::isfinite(box.radius), ==, true);
-  if (scene.camera.fitted) fitCamera(scene.camera, scene.output.size, box);
-  if (scene.defaultLights) scene.lights = {keyLight(scene.camera, box)};
-  scene.camera.fitted = scene.camera.fittedDepths = scene.defaultLights = false;
+  Camera& camera = scene.camera;
+  if (camera.fitted) fitCamera(camera, aspectOf(scene.output), box);
+  const double firstFrame = camera.keys.empty() ? 0 : static_cast<double>(camera.keys.front().frame);
+  if (scene.defaultLights) scene.lights = {keyLight(cameraAt(camera, firstFrame), box)};
+  camera.fitted = camera.fittedDepths = camera.fittedHeight = scene.defaultLights = false;
 }
 
 }  // namespace mote

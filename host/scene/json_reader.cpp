@@ -39,10 +39,6 @@ std::string wordList(std::span<const std::string_view> words) {
   return text;
 }
 
-std::string later(std::string_view what) {
-  return fmt::format("{} of the scene format that this version (Mote {}) does not support yet", what, MOTE_VERSION);
-}
-
 /// A JSON number as a 64-bit integer, or nothing. Signed ones as two's complement.
 std::optional<std::uint64_t> exactInteger(const JsonNode& node, bool isSigned) {
   const char* begin = node.text.data();
@@ -182,19 +178,24 @@ bool ObjectReader::text(std::string_view key, std::string& value) {
   return false;
 }
 
-bool ObjectReader::vector(std::string_view key, vec3& value, Range range) {
+template <class Vector>
+bool ObjectReader::vectorAt(std::string_view key, Vector& value, const Range& range) {
   const JsonNode* node = find(key);
   if (!node) return false;
   const std::string at = childPointer(pointer_, key);
-  if (node->kind != Kind::Array || node->items.size() != 3)
-    return problemAt(node->place, at, "an array of 3 numbers", node->shown()), false;
-  vec3 read = value;
+  constexpr int kLength = Vector::length();
+  if (node->kind != Kind::Array || node->items.size() != kLength)
+    return problemAt(node->place, at, fmt::format("an array of {} numbers", kLength), node->shown()), false;
+  Vector read = value;
   bool good = true;
-  for (int i = 0; i < 3; ++i)
+  for (int i = 0; i < kLength; ++i)
     good &= numberAt(fmt::format("{}/{}", at, i), node->items[static_cast<std::size_t>(i)], read[i], range);
   if (good) value = read;
   return good;
 }
+
+bool ObjectReader::vector(std::string_view key, vec3& value, Range range) { return vectorAt(key, value, range); }
+bool ObjectReader::vector(std::string_view key, vec2& value, Range range) { return vectorAt(key, value, range); }
 
 bool ObjectReader::pair(std::string_view key, ivec2& value, int min, int max, std::string_view unit) {
   const JsonNode* node = find(key);
@@ -212,28 +213,23 @@ bool ObjectReader::pair(std::string_view key, ivec2& value, int min, int max, st
 }
 
 std::optional<std::size_t> ObjectReader::word(const std::string& pointer, const JsonNode& node,
-                                              std::span<const std::string_view> words,
-                                              std::span<const std::string_view> laterWords) {
+                                              std::span<const std::string_view> words) {
   const bool isText = node.kind == Kind::String;
   const auto found = isText ? std::find(words.begin(), words.end(), node.text) : words.end();
   if (found != words.end()) return static_cast<std::size_t>(found - words.begin());
-  const bool isLater = isText && std::find(laterWords.begin(), laterWords.end(), node.text) != laterWords.end();
-  const std::string hint = isLater ? later("that is a word")
-                           : isText && words.size() > 1
-                               ? fmt::format("the nearest is \"{}\"", nearestWord(node.text, words))
-                               : "";
+  const std::string hint =
+      isText && words.size() > 1 ? fmt::format("the nearest is \"{}\"", nearestWord(node.text, words)) : "";
   problemAt(node.place, pointer, wordList(words), node.shown(), hint);
   return std::nullopt;
 }
 
-bool ObjectReader::words(std::string_view key, std::vector<bool>& set, std::span<const std::string_view> allowed,
-                         std::initializer_list<std::string_view> laterWords) {
+bool ObjectReader::words(std::string_view key, std::vector<bool>& set, std::span<const std::string_view> allowed) {
   const JsonNode* node = find(key);
   if (!node) return false;
   if (node->kind != Kind::Array) return problem(key, "an array of words", node->shown()), false;
   for (std::size_t i = 0; i < node->items.size(); ++i) {
     const std::string at = fmt::format("{}/{}", childPointer(pointer_, key), i);
-    const auto index = word(at, node->items[i], allowed, laterWords);
+    const auto index = word(at, node->items[i], allowed);
     if (index && set[*index]) problemAt(node->items[i].place, at, "each word once", node->items[i].shown());
     if (index) set[*index] = true;
   }
@@ -291,19 +287,13 @@ void ObjectReader::finish() {
   const std::vector<std::string_view> known(asked.begin(), asked.end());
   for (const JsonMember& member : node_->members) {
     if (std::find(known.begin(), known.end(), member.key) != known.end()) continue;
-    const bool isLater =
-        std::any_of(reading_->laterKeys_.begin(), reading_->laterKeys_.end(),
-                    [&](const LaterWord& word) { return word.object == generic_ && word.word == member.key; });
     const std::string expected = fmt::format("a key of {}, {}", noun_, wordList(known));
     const std::string place = reading_->document_.where(member.place), at = childPointer(pointer_, member.key);
-    if (isLater) {
-      problemAt(member.place, at, expected, quotedForMessage(member.key), later("that is a known key"));
-    } else if (reading_->unknownKey_.empty()) {
-      reading_->unknownKey_ =
-          InputError(place, at, expected, fmt::format("the unknown key {}", quotedForMessage(member.key)),
-                     fmt::format("the nearest is \"{}\"", nearestWord(member.key, known)))
-              .what();
-    }
+    if (!reading_->unknownKey_.empty()) continue;
+    reading_->unknownKey_ =
+        InputError(place, at, expected, fmt::format("the unknown key {}", quotedForMessage(member.key)),
+                   fmt::format("the nearest is \"{}\"", nearestWord(member.key, known)))
+            .what();
   }
 }
 

@@ -38,28 +38,19 @@ struct Choice {
   E value;
 };
 
-/// A key, or a word for a key's value, that the format has and this version does not read yet.
-/// `object` is a pointer with * for array indices: "/lights/*".
-struct LaterWord {
-  std::string_view object, word;
-};
-
 /// What one reading of a document has in common.
 class JsonReading {
  public:
-  /// `laterKeys` must outlive the reading.
-  JsonReading(const JsonDocument& document, std::span<const LaterWord> laterKeys)
-      : document_(document), laterKeys_(laterKeys) {}
+  explicit JsonReading(const JsonDocument& document) : document_(document) {}
 
   /// Throws the most telling problem, if there is one, as InputError.
   void throwFirst() const;
-  /// Every key asked for, by object; objects as in LaterWord.
+  /// Every key asked for, by object: its pointer with * for array indices, "/lights/*".
   const std::map<std::string, std::vector<std::string>>& keysAskedFor() const { return keys_; }
 
  private:
   friend class ObjectReader;
   const JsonDocument& document_;
-  std::span<const LaterWord> laterKeys_;
   std::string unknownKey_, firstProblem_;
   std::map<std::string, std::vector<std::string>> keys_;
 };
@@ -90,22 +81,22 @@ class ObjectReader {
   bool text(std::string_view key, std::string& value);
   /// [x, y, z], each in the range.
   bool vector(std::string_view key, vec3& value, Range range);
+  /// [x, y], each in the range.
+  bool vector(std::string_view key, vec2& value, Range range);
   /// [x, y] of whole numbers, each in min … max.
   bool pair(std::string_view key, ivec2& value, int min, int max, std::string_view unit);
-  /// One of the words; `later` are words of the format that this version does not know yet.
+  /// One of the words.
   template <class E>
-  bool choice(std::string_view key, E& value, std::initializer_list<Choice<E>> choices,
-              std::initializer_list<std::string_view> later = {}) {
+  bool choice(std::string_view key, E& value, std::initializer_list<Choice<E>> choices) {
     std::vector<std::string_view> words;
     for (const Choice<E>& choice : choices) words.push_back(choice.word);
     const JsonNode* node = find(key);
-    const auto index = node ? word(childPointer(pointer_, key), *node, words, later) : std::nullopt;
+    const auto index = node ? word(childPointer(pointer_, key), *node, words) : std::nullopt;
     if (index) value = choices.begin()[*index].value;
     return index.has_value();
   }
   /// An array of different words; `set[i]` becomes true where words[i] stands in it.
-  bool words(std::string_view key, std::vector<bool>& set, std::span<const std::string_view> words,
-             std::initializer_list<std::string_view> later);
+  bool words(std::string_view key, std::vector<bool>& set, std::span<const std::string_view> words);
 
   /// The object at `key`; where something else stands there, that is a problem.
   ObjectReader object(std::string_view key, std::string_view noun);
@@ -129,13 +120,15 @@ class ObjectReader {
   void problemAt(JsonPlace place, std::string_view pointer, std::string_view expected, std::string_view got,
                  std::string_view hint = {});
   bool numberAt(const std::string& pointer, const JsonNode& node, float& value, const Range& range);
+  template <class Vector>
+  bool vectorAt(std::string_view key, Vector& value, const Range& range);
   /// The integer as its two's complement bits; min and max converted to 64 bits by the caller's type.
   std::optional<std::uint64_t> wholeNumber(std::string_view key, const JsonNode& node, std::uint64_t min,
                                            std::uint64_t max, bool isSigned, std::string_view unit);
   std::optional<std::uint64_t> wholeNumberAt(const std::string& pointer, const JsonNode& node, std::uint64_t min,
                                              std::uint64_t max, bool isSigned, std::string_view unit);
   std::optional<std::size_t> word(const std::string& pointer, const JsonNode& node,
-                                  std::span<const std::string_view> words, std::span<const std::string_view> later);
+                                  std::span<const std::string_view> words);
 
   JsonReading* reading_;
   const JsonNode* node_;  // null: absent, or no object

@@ -119,9 +119,9 @@ struct Solid {
 
 enum class Projection { Perspective, Orthographic };
 
-/// What the camera is at one frame; between keys it moves smoothly.
+/// What the camera is at one frame; between keys it moves smoothly (camera_path.h).
 struct CameraKey {
-  float frame = 1;
+  float frame = 1;  ///< may be fractional
   std::optional<vec3> position, target, up;
   std::optional<float> fov, height, focusDistance;
 
@@ -130,16 +130,17 @@ struct CameraKey {
 
 struct Camera {
   Projection projection = Projection::Perspective;
-  bool fitted = false;        ///< true: no position and no target given; fitDefaults() places it by the bounding box
+  bool fitted = false;        ///< true: no position and no target, in no key either; fitDefaults() places it by the box
   bool fittedDepths = false;  ///< true: fitted, and neither near nor far given; fitDefaults() sets both
+  bool fittedHeight = false;  ///< true: fitted, orthographic, and no height given; fitDefaults() sets it
   vec3 position{0, 1, 4}, target{0, 0.5f, 0}, up{0, 1, 0};
   float fov = 40;                      ///< perspective: vertical, 0 < fov < 180
-  float height = 2;                    ///< orthographic: of the picture [scene units], > 0; fitDefaults() may set it
+  float height = 2;                    ///< orthographic: of the picture [scene units], > 0
   float near = 0.01f, far = 1000;      ///< depths; particles whose centre lies outside are not drawn
   vec2 shutter{0};                     ///< opens and closes, relative to the frame's time [s]; open ≤ close
   float apertureRadius = 0;            ///< of the lens [scene units], ≥ 0; 0: everything is sharp
   std::optional<float> focusDistance;  ///< depth that is sharp [scene units], > 0; none: that of the target
-  std::vector<CameraKey> keys;         ///< ascending frames; empty: the camera stands still
+  std::vector<CameraKey> keys;         ///< strictly ascending frames; empty: the camera stands still
 
   bool operator==(const Camera&) const = default;
 };
