@@ -9,6 +9,9 @@
 namespace mote {
 
 /// Structure of arrays. Every array has size() entries or, where the remark says so, none.
+///
+/// Where there is absorption, a particle's extinction per colour channel is
+///   density · (color · medium.albedo + absorption) · medium.extinction, else density · medium.extinction.
 struct ParticleSet {
   std::vector<vec3> position;      ///< centre [scene units], finite
   std::vector<float> radius;       ///< support radius r [scene units], finite, > 0
@@ -16,6 +19,8 @@ struct ParticleSet {
   std::vector<vec3> color;         ///< scattering albedo, RGB; empty: all of them `uniformColor`
   std::vector<vec3> velocity;      ///< [scene units / s]; empty: no source has it
   std::vector<std::uint64_t> id;   ///< empty: no source has it
+  std::vector<vec3> absorption;    ///< RGB, relative to `density`, finite, ≥ 0; empty: no source has it
+  std::vector<vec3> emission;      ///< radiance, RGB [W/(m² sr)], finite, ≥ 0; empty: no source has it
   vec3 uniformColor{1};
 
   std::size_t size() const { return position.size(); }
