@@ -118,6 +118,17 @@ TEST(CameraPath, MovesSteadilyAlongALineOfUnevenFrames) {
     EXPECT_NEAR(static_cast<double>(cameraAt(camera, frame).position.x), frame, 2.4e-7) << frame;  // float below 8
 }
 
+TEST(CameraPath, FallsAlongAParabolaWhateverTheFrames) {
+  // What the tangents are made for: uniform acceleration comes back exactly, first and last piece included.
+  const auto fall = [](double frame) { return 0.25 * frame * frame - frame; };
+  Camera camera;
+  for (const float frame : {0.0f, 1.0f, 4.0f, 4.5f, 6.0f})
+    camera.keys.push_back(positionAt(frame, vec3(frame, fall(static_cast<double>(frame)), 4)));
+  for (double frame = 0; frame <= 6; frame += 0.0625)
+    EXPECT_NEAR(static_cast<double>(cameraAt(camera, frame).position.y), fall(frame), 1.2e-7)
+        << frame;  // float below 4
+}
+
 TEST(CameraPath, StaysOnACircleOfTwelveKeys) {
   Camera camera;
   camera.target = vec3(0);

@@ -331,7 +331,7 @@ TEST(SceneSchema, AcceptsAndRefusesAtEveryKeyWhatTheParserDoes) {
       ASSERT_TRUE(named) << pointer << " = " << value << "\n" << verdict.message;
     }
   });
-  // About 130 keys, those of both cameras and the three lights counted each; at least one good and twenty bad values
+  // About 140 keys, those of both cameras and the three lights counted each; at least one good and twenty bad values
   // each.
   EXPECT_GT(accepted, 400u);
   EXPECT_GT(refused, 2600u);

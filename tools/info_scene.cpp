@@ -185,7 +185,8 @@ std::string cameraText(const Json& camera) {
   if (camera.contains("height") && !camera["height"].is_null())
     text += fmt::format(", height {:g}", camera["height"].get<double>());
   if (camera["fitted"] == true) text += ", fitted to the particles";
-  if (camera["keys"] != 0) text += fmt::format(", {} keys", camera["keys"].get<std::size_t>());
+  const auto keys = camera["keys"].get<std::size_t>();
+  if (keys > 0) text += fmt::format(", {} {}", keys, keys == 1 ? "key" : "keys");
   const double opens = camera["shutter"][0].get<double>(), closes = camera["shutter"][1].get<double>();
   if (closes > opens) text += fmt::format(", shutter {:g} to {:g} s", opens, closes);
   const double aperture = camera["aperture_radius"].get<double>();

@@ -475,7 +475,7 @@ TEST(MoteInfo, LeavesOpenWhatParticlesAndKeysDecide) {
   EXPECT_TRUE(info["camera"]["focus_distance"].is_null());
   EXPECT_EQ(info["lighting"]["subsample"], "auto");
   const ProcessResult text = test::mote({"info", folder.file("s.json")});
-  for (const char* part : {"orthographic, fitted to the particles, 1 keys, aperture radius 0.5, sharp at the target",
+  for (const char* part : {"orthographic, fitted to the particles, 1 key, aperture radius 0.5, sharp at the target",
                            "the smallest share of the particles within the error in the octree"})
     EXPECT_TRUE(contains(text.out, part)) << text.out;
 }
