@@ -57,8 +57,8 @@ struct Medium {
   float densityScale = 1;             ///< ≥ 0
   std::optional<float> opticalDepth;  ///< instead of densityScale: mean τ of straight lines through the particles, > 0
   Falloff falloff = Falloff::Smooth;
-  vec3 albedo{0.95f};   ///< 0–1, multiplies Color
-  vec3 extinction{1};   ///< ≥ 0, multiplies the extinction cross-section per channel
+  vec3 albedo{0.95f};  ///< 0–1, multiplies Color
+  vec3 extinction{1};  ///< ≥ 0, multiplies the extinction cross-section per channel
   Phase phase;
   float emissionScale = 1;  ///< ≥ 0, multiplies Emission
 
@@ -91,12 +91,12 @@ struct LightingSettings {
   Endpoint endpoint = Endpoint::Soft;
   float radiusScale = 1;               ///< > 0: factor on the radii that shadows are computed with (§4.6.4)
   std::uint32_t particlesPerCell = 0;  ///< 0: auto
-  float subsample = 1;         ///< share of the particles in the octree, 0 < share ≤ 1 (§4.6.3)
-  bool autoSubsample = false;  ///< true: the smallest share whose mean |ΔT| is within `error`
+  float subsample = 1;                 ///< share of the particles in the octree, 0 < share ≤ 1 (§4.6.3)
+  bool autoSubsample = false;          ///< true: the smallest share whose mean |ΔT| is within `error`
   std::uint64_t subsampleSeed = 0;
-  bool compensate = true;         ///< the octree's particles stand for all: the total cross-section stays
-  float error = 0;                ///< 0: exact; else the mean |ΔT| that approximations must keep; 0–1
-  float solidShadowIntensity = 1; ///< 0–1: share of the light that a solid in its way takes (§4.6.2)
+  bool compensate = true;          ///< the octree's particles stand for all: the total cross-section stays
+  float error = 0;                 ///< 0: exact; else the mean |ΔT| that approximations must keep; 0–1
+  float solidShadowIntensity = 1;  ///< 0–1: share of the light that a solid in its way takes (§4.6.2)
 
   bool operator==(const LightingSettings&) const = default;
 };
@@ -105,9 +105,9 @@ enum class SolidMode { Shaded, Holdout, Hidden };
 
 /// A mesh that stands in the medium.
 struct Solid {
-  std::string pointer;  ///< where it stands in the scene, "/solids/0": the place of messages
-  std::string name;     ///< unique; letters, digits, '_'
-  std::string file;     ///< path as opened; may hold ####
+  std::string pointer;                 ///< where it stands in the scene, "/solids/0": the place of messages
+  std::string name;                    ///< unique; letters, digits, '_'
+  std::string file;                    ///< path as opened; may hold ####
   SolidMode mode = SolidMode::Shaded;  ///< in the picture: Lambert; cut out of the medium; not at all
   vec3 albedo{0.5f};                   ///< 0–1
   bool castsShadows = true, receivesShadows = true;
@@ -130,15 +130,15 @@ struct CameraKey {
 
 struct Camera {
   Projection projection = Projection::Perspective;
-  bool fitted = false;  ///< true: no position and no target, in no key either; fitDefaults() places it by the box
+  bool fitted = false;        ///< true: no position and no target, in no key either; fitDefaults() places it by the box
   bool fittedDepths = false;  ///< true: fitted, and neither near nor far given; fitDefaults() sets both
   bool fittedHeight = false;  ///< true: fitted, orthographic, and no height given; fitDefaults() sets it
   vec3 position{0, 1, 4}, target{0, 0.5f, 0}, up{0, 1, 0};
-  float fov = 40;                  ///< perspective: vertical, 0 < fov < 180
-  float height = 2;                ///< orthographic: of the picture [scene units], > 0
-  float near = 0.01f, far = 1000;  ///< depths; particles whose centre lies outside are not drawn
-  vec2 shutter{0};                 ///< opens and closes, relative to the frame's time [s]; open ≤ close
-  float apertureRadius = 0;        ///< of the lens [scene units], ≥ 0; 0: everything is sharp
+  float fov = 40;                      ///< perspective: vertical, 0 < fov < 180
+  float height = 2;                    ///< orthographic: of the picture [scene units], > 0
+  float near = 0.01f, far = 1000;      ///< depths; particles whose centre lies outside are not drawn
+  vec2 shutter{0};                     ///< opens and closes, relative to the frame's time [s]; open ≤ close
+  float apertureRadius = 0;            ///< of the lens [scene units], ≥ 0; 0: everything is sharp
   std::optional<float> focusDistance;  ///< depth that is sharp [scene units], > 0; none: that of the target
   std::vector<CameraKey> keys;         ///< strictly ascending frames; empty: the camera stands still
 
