@@ -21,8 +21,10 @@ double filled(const Scene& scene, const Bounds& box) {
   const Camera& camera = scene.camera;
   const dvec3 view = glm::normalize(dvec3(camera.target) - dvec3(camera.position));
   const dvec3 right = glm::normalize(glm::cross(view, dvec3(camera.up))), up = glm::cross(right, view);
-  const double tanY = std::tan(static_cast<double>(camera.fov) * kPi / 360);
-  const double tanX = tanY * scene.output.size.x / scene.output.size.y;
+  const bool perspective = camera.projection == Projection::Perspective;
+  const double halfY = perspective ? std::tan(static_cast<double>(camera.fov) * kPi / 360) : 0.5 * camera.height;
+  const double halfX =
+      halfY * static_cast<double>(scene.output.pixelAspect) * scene.output.size.x / scene.output.size.y;
   double most = 0;
   for (int i = 0; i < 8; ++i) {
     const dvec3 corner(i & 1 ? box.hi.x : box.lo.x, i & 2 ? box.hi.y : box.lo.y, i & 4 ? box.hi.z : box.lo.z);
@@ -30,38 +32,104 @@ double filled(const Scene& scene, const Bounds& box) {
     const double depth = glm::dot(from, view);
     if (depth < static_cast<double>(camera.near) || depth > static_cast<double>(camera.far))
       return std::numeric_limits<double>::infinity();
+    const double scale = perspective ? depth : 1;
     most = std::max(
-        {most, std::abs(glm::dot(from, right)) / (depth * tanX), std::abs(glm::dot(from, up)) / (depth * tanY)});
+        {most, std::abs(glm::dot(from, right)) / (scale * halfX), std::abs(glm::dot(from, up)) / (scale * halfY)});
   }
   return most;
 }
 
+const Bounds kBoxes[] = {{{-1, -1, -1}, {1, 1, 1}},
+                         {{0, 0, 0}, {1, 20, 1}},
+                         {{-50, 0, -50}, {50, 0.1f, 50}},
+                         {{1e3f, 2e3f, -3e3f}, {1e3f + 1, 2e3f + 2, -3e3f + 3}},
+                         {{-1e-6f, 0, 0}, {1e-6f, 1e-6f, 1e-6f}},
+                         {{-1e9f, 0, 0}, {1e9f, 1e8f, 1e9f}},
+                         {{0, 0, -1}, {0, 0, 1}}};
+const ivec2 kSizes[] = {{1280, 720}, {100, 1000}, {4000, 100}};
+const vec3 kUps[] = {{0, 1, 0}, {0, 0, 1}, {1, 2, -0.5f}};
+
+void expectSeen(const Scene& scene, const Bounds& box) {
+  // 0.9 is the margin asked for; float positions far from the origin may take a share of it.
+  EXPECT_LE(filled(scene, box), 0.91) << box.hi.x << " " << scene.output.size.x << " " << scene.camera.up.z;
+  // "Slightly above", as the scene's up has it.
+  const vec3 toCamera = glm::normalize(scene.camera.position - scene.camera.target);
+  EXPECT_NEAR(glm::dot(toCamera, glm::normalize(scene.camera.up)), std::sin(15 * kPi / 180), 1e-3);
+}
+
 TEST(Fitting, SeesTheWholeBoxWithAMarginAtEveryShapeSizeAndUp) {
-  const Bounds boxes[] = {{{-1, -1, -1}, {1, 1, 1}},
-                          {{0, 0, 0}, {1, 20, 1}},
-                          {{-50, 0, -50}, {50, 0.1f, 50}},
-                          {{1e3f, 2e3f, -3e3f}, {1e3f + 1, 2e3f + 2, -3e3f + 3}},
-                          {{-1e-6f, 0, 0}, {1e-6f, 1e-6f, 1e-6f}},
-                          {{-1e9f, 0, 0}, {1e9f, 1e8f, 1e9f}},
-                          {{0, 0, -1}, {0, 0, 1}}};
-  for (const Bounds& box : boxes) {
-    for (const ivec2 size : {ivec2(1280, 720), ivec2(100, 1000), ivec2(4000, 100)}) {
-      for (const vec3 up : {vec3(0, 1, 0), vec3(0, 0, 1), vec3(1, 2, -0.5f)}) {
+  for (const Bounds& box : kBoxes) {
+    for (const ivec2 size : kSizes) {
+      for (const vec3 up : kUps) {
         for (const float fov : {5.0f, 40.0f, 120.0f}) {
           Scene scene = parseScene(kLeast, "s.json");
           scene.output.size = size;
+          scene.output.pixelAspect = fov == 5 ? 0.5f : 2;
           scene.camera.up = up;
           scene.camera.fov = fov;
           fitDefaults(scene, box);
-          // 0.9 is the margin asked for; float positions far from the origin may take a share of it.
-          EXPECT_LE(filled(scene, box), 0.91) << box.hi.x << " " << size.x << " " << up.z << " " << fov;
-          // "Slightly above", as the scene's up has it.
-          const vec3 toCamera = glm::normalize(scene.camera.position - scene.camera.target);
-          EXPECT_NEAR(glm::dot(toCamera, glm::normalize(up)), std::sin(15 * kPi / 180), 1e-3);
+          expectSeen(scene, box);
         }
       }
     }
   }
+}
+
+TEST(Fitting, SeesTheWholeBoxOrthographically) {
+  for (const Bounds& box : kBoxes) {
+    for (const ivec2 size : kSizes) {
+      for (const vec3 up : kUps) {
+        for (const float pixelAspect : {0.25f, 1.0f, 3.0f}) {
+          Scene scene = parseScene(with(R"("camera": {"type": "orthographic"})"), "s.json");
+          scene.output.size = size;
+          scene.output.pixelAspect = pixelAspect;
+          scene.camera.up = up;
+          fitDefaults(scene, box);
+          expectSeen(scene, box);
+        }
+      }
+    }
+  }
+}
+
+TEST(Fitting, FillsAnOrthographicPictureByHeightOrWidth) {
+  const Bounds cube{vec3(-1), vec3(1)};
+  for (const ivec2 size : {ivec2(4000, 100), ivec2(100, 1000)}) {
+    for (const float pixelAspect : {0.5f, 2.0f}) {
+      Scene scene = parseScene(with(R"("camera": {"type": "orthographic"})"), "s.json");
+      scene.output.size = size;
+      scene.output.pixelAspect = pixelAspect;
+      fitDefaults(scene, cube);
+      EXPECT_NEAR(filled(scene, cube), 0.9, 1e-5);  // positions are floats
+      EXPECT_FALSE(scene.camera.fittedHeight);
+    }
+  }
+}
+
+TEST(Fitting, KeepsAnOrthographicHeightThatIsGiven) {
+  Scene scene = parseScene(with(R"("camera": {"type": "orthographic", "height": 5})"), "s.json");
+  fitDefaults(scene, {vec3(-1), vec3(1)});
+  EXPECT_EQ(scene.camera.height, 5);
+  EXPECT_NE(scene.camera.position, Camera{}.position);
+}
+
+TEST(Fitting, PlacesTheKeyLightByTheCameraOfTheFirstKey) {
+  Scene scene = parseScene(with(R"("camera": {"keys": [{"frame": 3, "position": [9, 0, 0], "target": [0, 0, 0]},
+      {"frame": 5, "position": [-9, 0, 0]}]})"),
+                           "s.json");
+  fitDefaults(scene, {vec3(-1), vec3(1)});
+  ASSERT_EQ(scene.lights.size(), 1u);
+  EXPECT_LT(scene.lights[0].position.x, -1);  // behind the box, which is seen from +x
+  EXPECT_GT(scene.lights[0].position.z, 1);   // and to the left
+  EXPECT_EQ(scene.camera.keys.size(), 2u);
+}
+
+TEST(Fitting, PlacesACameraWhoseKeysOnlyZoom) {
+  Scene scene = parseScene(with(R"("camera": {"keys": [{"frame": 1, "fov": 10}, {"frame": 5, "fov": 60}]})"), "s.json");
+  const Bounds cube{vec3(-1), vec3(1)};
+  fitDefaults(scene, cube);
+  EXPECT_NEAR(filled(scene, cube), 0.9, 1e-5);  // at the camera's own fov; positions are floats
+  EXPECT_EQ(scene.camera.keys.size(), 2u);
 }
 
 TEST(Fitting, FillsThePictureWithACube) {

@@ -168,6 +168,89 @@ TEST(ParticleLoader, MergesSourcesWithDifferentChannels) {
   EXPECT_EQ(set.density[4], 2);
 }
 
+// ---- absorption and emission ----
+
+/// Sample with Absorption and Emission of their own.
+struct Glowing : Sample {
+  std::vector<vec3> absorption{{0, 0.5f, 3}, {1, 0, 0}, {0, 0, 0}}, emission{{10, 0, 0}, {0, 0.25f, 0}, {0, 0, 0}};
+
+  void write(const std::string& path) const {
+    const PrtColumn columns[] = {PrtColumn::of("Position", position), PrtColumn::of("Radius", radius),
+                                 PrtColumn::of("Absorption", absorption), PrtColumn::of("Emission", emission)};
+    writePrt(path, columns);
+  }
+};
+
+TEST(ParticleLoader, TakesAbsorptionAndEmissionAndDoesNotScaleThem) {
+  const TempFolder folder;
+  const Glowing glowing;
+  glowing.write(folder.file("a.prt"));
+  ParticleSource source = fileSource(folder.file("a.prt"));
+  source.scale = 2;
+  source.rotate = vec3(90, 0, 0);
+  const ParticleSet set = loadParticles({source}, 1);
+  EXPECT_EQ(set.absorption, glowing.absorption);
+  EXPECT_EQ(set.emission, glowing.emission);
+}
+
+TEST(ParticleLoader, TakesGreyAbsorptionAndEmissionByTheNamesOfTheScene) {
+  const TempFolder folder;
+  const Sample sample;
+  const std::vector<float> soot{0.5f, 0, 2}, heat{1, 2, 3};
+  const PrtColumn columns[] = {PrtColumn::of("Position", sample.position), PrtColumn::of("Radius", sample.radius),
+                               PrtColumn::of("soot", soot), PrtColumn::of("heat", heat)};
+  writePrt(folder.file("a.prt"), columns);
+  ParticleSource source = fileSource(folder.file("a.prt"));
+  EXPECT_TRUE(loadParticles({source}, 1).absorption.empty());
+  EXPECT_TRUE(loadParticles({source}, 1).emission.empty());
+  source.channels = {{"Absorption", "soot"}, {"Emission", "heat"}};
+  const ParticleSet set = loadParticles({source}, 1);
+  EXPECT_EQ(set.absorption, (std::vector<vec3>{vec3(0.5f), vec3(0), vec3(2)}));
+  EXPECT_EQ(set.emission, (std::vector<vec3>{vec3(1), vec3(2), vec3(3)}));
+  source.channels = {{"Absorption", "ash"}};
+  expectRefused([&] { loadParticles({source}, 1); }, {"channels/Absorption", "'ash'", "it has Position"});
+}
+
+TEST(ParticleLoader, GivesSourcesWithoutAbsorptionWhatTheirColourLeaves) {
+  const TempFolder folder;
+  Glowing().write(folder.file("glowing.prt"));
+  Sample coloured;
+  coloured.color = {{0.25f, 1, 0}, {2, 0, 0.5f}, {1, 1, 1}};  // brighter than 1: nothing is left
+  coloured.write(folder.file("coloured.prt"));
+  ParticleSource plain = fileSource(folder.file("plain.prt"));
+  coloured.writePositions(plain.file);
+  plain.radius = {RadiusRule::Kind::Number, 1, "Radius", 1};
+  plain.color = vec3(0.75f, 1, 0);
+  const ParticleSet set =
+      loadParticles({fileSource(folder.file("coloured.prt")), plain, fileSource(folder.file("glowing.prt"))}, 1);
+  ASSERT_EQ(set.absorption.size(), 9u);
+  EXPECT_EQ(set.absorption[0], vec3(0.75f, 0, 1));
+  EXPECT_EQ(set.absorption[1], vec3(0, 1, 0.5f));
+  EXPECT_EQ(set.absorption[2], vec3(0));
+  EXPECT_EQ(set.absorption[3], vec3(0.25f, 0, 1));
+  EXPECT_EQ(set.absorption[6], vec3(0, 0.5f, 3));
+  ASSERT_EQ(set.emission.size(), 9u);
+  EXPECT_EQ(set.emission[5], vec3(0));
+  EXPECT_EQ(set.emission[6], vec3(10, 0, 0));
+}
+
+TEST(ParticleLoader, RefusesBadAbsorptionAndEmission) {
+  const TempFolder folder;
+  const std::string path = folder.file("a.prt");
+  Glowing glowing;
+  glowing.absorption[1].z = -0.5f;
+  glowing.write(path);
+  expectRefused([&] { loadParticles({fileSource(path)}, 1); },
+                {"a.prt: particle 1: absorption", "finite numbers ≥ 0", "(1, 0, -0.5)"});
+  glowing.absorption[1].z = std::numeric_limits<float>::quiet_NaN();
+  glowing.write(path);
+  expectRefused([&] { loadParticles({fileSource(path)}, 1); }, {"particle 1: absorption", "nan"});
+  glowing = {};
+  glowing.emission[2].x = std::numeric_limits<float>::infinity();
+  glowing.write(path);
+  expectRefused([&] { loadParticles({fileSource(path)}, 1); }, {"particle 2: emission", "inf"});
+}
+
 TEST(ParticleLoader, KeepsTwoUniformColoursApart) {
   const TempFolder folder;
   Sample().writePositions(folder.file("a.prt"));

@@ -538,6 +538,32 @@ TEST(PrtWriter, WritesVersion10AndNoParticles) {
   EXPECT_TRUE(positionsOf(readBytes(folder.file("b.prt"))).empty());
 }
 
+TEST(PrtWriter, WritesEveryChannelThatASetHas) {
+  ParticleSet set;
+  set.position = {vec3(1, 2, 3), vec3(4, 5, 6)};
+  set.radius = {0.5f, 1};
+  set.density = {1, 2};
+  const auto names = [&] {
+    std::vector<std::string> list;
+    for (const PrtColumn& column : columnsOf(set)) list.push_back(column.name);
+    return list;
+  };
+  EXPECT_EQ(names(), (std::vector<std::string>{"Position", "Radius", "Density"}));
+  set.color = set.velocity = {vec3(0), vec3(1)};
+  set.absorption = {vec3(1, 2, 3), vec3(0)};
+  set.emission = {vec3(0), vec3(7, 8, 9)};
+  set.id = {3, 4};
+  EXPECT_EQ(names(), (std::vector<std::string>{"Position", "Radius", "Density", "Color", "Absorption", "Emission",
+                                               "Velocity", "ID"}));
+  const TempFolder folder;
+  writePrt(folder.file("a.prt"), columnsOf(set));
+  std::vector<vec3> absorption, emission;
+  const PrtRequest requests[] = {{"Absorption", &absorption}, {"Emission", &emission}};
+  PrtReader(folder.file("a.prt")).read(requests);
+  EXPECT_EQ(absorption, set.absorption);
+  EXPECT_EQ(emission, set.emission);
+}
+
 TEST(PrtWriter, LeavesNothingBehindWhenTheDiskIsFull) {
   const TempFolder folder;
   std::vector<vec3> positions(300'000);

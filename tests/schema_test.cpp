@@ -69,6 +69,7 @@ const std::set<std::string> kKeywords = {"$schema",
                                          "items",
                                          "minItems",
                                          "maxItems",
+                                         "minProperties",
                                          "uniqueItems",
                                          "enum",
                                          "const",
@@ -106,6 +107,7 @@ bool accepts(const json& unresolved, const json& value) {
       if (node.contains("items") && !accepts(node["items"], item)) return false;
   }
   if (value.is_object()) {
+    if (value.size() < node.value("minProperties", 0u)) return false;
     for (const json& key : node.value("required", json::array()))
       if (!value.contains(key.get<std::string>())) return false;
     for (const auto& [key, member] : value.items()) {
@@ -199,10 +201,11 @@ json leastObject(const json& node) {
   json object = json::object();
   for (const json& key : node.value("required", json::array())) {
     const json property = resolved(node["properties"][key.get<std::string>()]);
-    object[key.get<std::string>()] = property.contains("const")     ? property["const"]
-                                     : property.contains("enum")    ? property["enum"][0]
-                                     : property.contains("minimum") ? property["minimum"]
-                                                                    : json("x.prt");
+    object[key.get<std::string>()] = property.contains("const")              ? property["const"]
+                                     : property.contains("enum")             ? property["enum"][0]
+                                     : property.contains("minimum")          ? property["minimum"]
+                                     : property.contains("exclusiveMinimum") ? json(0.5)
+                                                                             : json("x.prt");
   }
   return object;
 }
@@ -213,9 +216,22 @@ const std::map<std::string, json> kCompanions = {
     {"/camera/far", {{"near", 1e-18}}},
     {"/camera/position", {{"up", {0.3, 0.5, 0.8}}}},
     {"/camera/target", {{"up", {0.3, 0.5, 0.8}}}},
+    {"/camera/keys/0/frame", {{"focus_distance", 3}}},
+    {"/camera/keys/0/position", {{"up", {0.3, 0.5, 0.8}}}},
+    {"/camera/keys/0/target", {{"up", {0.3, 0.5, 0.8}}}},
+    {"/lighting/subsample", {{"error", 0.5}}},
     {"/frames/first", {{"last", 9999999}}},
     {"/frames/last", {{"first", -9999999}}},
 };
+
+/// Keys whose value makes another one wrong or missing, and where the parser then says so.
+const std::map<std::string, std::string> kAccomplices = {{"/medium/phase/type", "/medium/phase"}};
+
+/// Values that the schema takes and the parser does not, because their numbers depend on each other (scene_test.cpp).
+bool isBeyondTheSchema(const std::string& pointer, const json& value) {
+  return pointer == "/camera/shutter" && value.is_array() && value.size() == 2 && value[0].is_number() &&
+         value[1].is_number() && value[0].get<float>() > value[1].get<float>();
+}
 
 struct Verdict {
   bool accepted;
@@ -297,6 +313,7 @@ TEST(SceneSchema, AcceptsAndRefusesAtEveryKeyWhatTheParserDoes) {
     std::vector<json> values = candidates(property);
     for (const std::string& word : expectedWords(base, pointer)) values.push_back(word);
     for (const json& value : values) {
+      if (isBeyondTheSchema(pointer, value)) continue;
       json scene = base;
       for (const auto& [key, companion] : companions.items())
         scene[Pointer(pointer).parent_pointer() / key] = companion;
@@ -306,14 +323,18 @@ TEST(SceneSchema, AcceptsAndRefusesAtEveryKeyWhatTheParserDoes) {
       ASSERT_EQ(verdict.accepted, expected) << pointer << " = " << value << "\n" << verdict.message;
       (expected ? accepted : refused) += 1;
       if (expected) continue;
-      const bool named = verdict.message.find(": " + pointer + ": ") != std::string::npos ||
-                         verdict.message.find(": " + pointer + "/") != std::string::npos;
+      const auto names = [&](const std::string& at) {
+        return verdict.message.find(": " + at + ": ") != std::string::npos ||
+               verdict.message.find(": " + at + "/") != std::string::npos;
+      };
+      const bool named = names(pointer) || (kAccomplices.contains(pointer) && names(kAccomplices.at(pointer)));
       ASSERT_TRUE(named) << pointer << " = " << value << "\n" << verdict.message;
     }
   });
-  // About 60 keys with at least one good and twenty bad values each.
-  EXPECT_GT(accepted, 200u);
-  EXPECT_GT(refused, 1200u);
+  // About 140 keys, those of both cameras and the three lights counted each; at least one good and twenty bad values
+  // each.
+  EXPECT_GT(accepted, 400u);
+  EXPECT_GT(refused, 2600u);
 }
 
 TEST(SceneSchema, RefusesAnUnknownKeyInEveryObjectAsTheParserDoes) {
@@ -340,9 +361,22 @@ TEST(SceneSchema, RefusesAMissingRequiredKeyAsTheParserDoes) {
 }
 
 TEST(SceneSchema, RefusesKeysThatExcludeEachOtherAsTheParserDoes) {
-  const json excluding = {{"medium", {{"density_scale", 1}, {"optical_depth", 4}}},
-                          {"lights", {{{"type", "directional"}, {"position", {1, 2, 3}}}}}};
-  for (const auto& [key, value] : excluding.items()) {
+  const std::pair<const char*, json> excluding[] = {
+      {"medium", {{"density_scale", 1}, {"optical_depth", 4}}},
+      {"medium", {{"phase", {{"type", "rayleigh"}, {"g", 0.5}}}}},
+      {"medium", {{"phase", {{"type", "henyey_greenstein"}}}}},
+      {"lights", {{{"type", "directional"}, {"position", {1, 2, 3}}}}},
+      {"lights", {{{"type", "point"}, {"target", {1, 2, 3}}}}},
+      {"lights", {{{"type", "spot"}, {"direction", {1, 2, 3}}}}},
+      {"lights", {{{"outer_angle", 30}}}},
+      {"solids", {{{"name", "a"}}}},
+      {"camera", {{"height", 3}}},
+      {"camera", {{"type", "orthographic"}, {"fov", 30}}},
+      {"camera", {{"keys", {{{"frame", 1}, {"height", 3}}}}}},
+      {"camera", {{"type", "orthographic"}, {"keys", {{{"frame", 1}, {"fov", 30}}}}}},
+      {"camera", {{"keys", {{{"frame", 1}}}}}},
+      {"camera", {{"keys", {{{"fov", 30}, {"focus_distance", 3}}}}}}};
+  for (const auto& [key, value] : excluding) {
     const json scene = {{"particles", {{{"file", "x.prt"}}}}, {key, value}};
     EXPECT_FALSE(accepts(schema(), scene)) << scene;
     EXPECT_FALSE(parse(scene).accepted) << scene;
@@ -365,7 +399,7 @@ TEST(SceneSchema, HasTheParsersDefaults) {
     ++defaults;
     EXPECT_EQ(parseScene(scene.dump(), "s.json"), parseScene(base.dump(), "s.json")) << pointer;
   });
-  EXPECT_GT(defaults, 30u);
+  EXPECT_GT(defaults, 60u);
 }
 
 TEST(SceneSchema, DescribesEveryKey) {

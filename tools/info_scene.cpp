@@ -1,4 +1,6 @@
 // The scenes' part of `mote info`: what they hold, and an estimate of what their first frame takes.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -9,6 +11,7 @@
 #include "host/octree/octree.h"
 #include "host/particles/missing_file.h"
 #include "host/particles/prt_reader.h"
+#include "host/scene/camera_path.h"
 #include "host/scene/frame_path.h"
 #include "host/scene/scene_reader.h"
 #include "shaders/glsl/layout/node.h"
@@ -25,7 +28,7 @@ using Json = nlohmann::ordered_json;
 struct SourceFacts {
   std::uint64_t count = 0;
   std::string from, radius;
-  bool color = false, velocity = false, id = false;
+  bool color = false, absorption = false, emission = false, velocity = false, id = false;
 };
 
 const char* nameOf(Generator generator) {
@@ -55,13 +58,23 @@ SourceFacts fileFacts(const ParticleSource& source, int frame) {
     const auto renamed = source.channels.find(ours);
     return file.header().channel(renamed == source.channels.end() ? ours : renamed->second) != nullptr;
   };
-  return {file.count(), path, radiusText(source, has("Radius")), has("Color"), has("Velocity"), has("ID")};
+  return {.count = file.count(),
+          .from = path,
+          .radius = radiusText(source, has("Radius")),
+          .color = has("Color"),
+          .absorption = has("Absorption"),
+          .emission = has("Emission"),
+          .velocity = has("Velocity"),
+          .id = has("ID")};
 }
 
 SourceFacts factsOf(const ParticleSource& source, int frame) {
   if (!source.file.empty()) return fileFacts(source, frame);
-  return {source.count, nameOf(source.generate), radiusText(source, true), false, source.generate == Generator::Plume,
-          true};
+  return {.count = source.count,
+          .from = nameOf(source.generate),
+          .radius = radiusText(source, true),
+          .velocity = source.generate == Generator::Plume,
+          .id = true};
 }
 
 /// Bytes that the stages of one frame hold at their peak: what grows with the particles or the picture, and the program
@@ -80,8 +93,8 @@ MemoryNeed memoryNeed(double particles, const std::vector<SourceFacts>& sources,
   const auto any = [&](bool SourceFacts::*has) {
     return std::any_of(sources.begin(), sources.end(), [&](const SourceFacts& s) { return s.*has; });
   };
-  const double set =
-      12 + 4 + 4 + 12 * any(&SourceFacts::color) + 12 * any(&SourceFacts::velocity) + 8 * any(&SourceFacts::id);
+  const double set = 12 + 4 + 4 + 12 * any(&SourceFacts::color) + 12 * any(&SourceFacts::absorption) +
+                     12 * any(&SourceFacts::emission) + 12 * any(&SourceFacts::velocity) + 8 * any(&SourceFacts::id);
   constexpr double kTree = 6 * 4;                               // x, y, z, radius, peak, source
   constexpr double kDraw = sizeof(layout::SplatParticle) + 12;  // with radiance, or with (key, index) and order
   constexpr double kLightDevice = 16 + 4 + 4 + 4;               // position and radius, peak, order, optical depth
@@ -98,12 +111,30 @@ MemoryNeed memoryNeed(double particles, const std::vector<SourceFacts>& sources,
 /// beside each other: N^(1/3) (DESIGN §5).
 double raySeconds(double particles) { return 2e-6 * std::cbrt(particles / 1e6) / threadCount(); }
 
+const char* nameOf(LightType type) {
+  switch (type) {
+    case LightType::Point: return "point";
+    case LightType::Spot: return "spot";
+    case LightType::Directional: return "directional";
+  }
+  return "";
+}
+
+const char* nameOf(SolidMode mode) {
+  switch (mode) {
+    case SolidMode::Shaded: return "shaded";
+    case SolidMode::Holdout: return "holdout";
+    case SolidMode::Hidden: return "hidden";
+  }
+  return "";
+}
+
 Json lightsJson(const Scene& scene) {
   if (scene.defaultLights) return {{{"name", "key"}, {"type", "point"}, {"casts_shadows", true}, {"fitted", true}}};
   Json list = Json::array();
   for (const LightSource& light : scene.lights)
     list.push_back({{"name", light.name},
-                    {"type", light.type == LightType::Point ? "point" : "directional"},
+                    {"type", nameOf(light.type)},
                     {"casts_shadows", light.castsShadows && light.shadowDensity > 0}});
   return list;
 }
@@ -114,6 +145,72 @@ std::string listed(const Json& lights) {
     text += fmt::format("{}{} ({}{})", text.empty() ? "" : ", ", light["name"].get<std::string>(),
                         light["type"].get<std::string>(), light.contains("fitted") ? ", fitted to the particles" : "");
   return text.empty() ? "none" : text;
+}
+
+Json solidsJson(const Scene& scene) {
+  Json list = Json::array();
+  for (const Solid& solid : scene.solids)
+    list.push_back({{"name", solid.name},
+                    {"file", framePath(solid.file, scene.frames.first)},
+                    {"mode", nameOf(solid.mode)},
+                    {"casts_shadows", solid.castsShadows}});
+  return list;
+}
+
+/// What the particles or the keys decide stays null.
+Json cameraJson(const Camera& camera) {
+  const bool perspective = camera.projection == Projection::Perspective;
+  Json json = {{"type", perspective ? "perspective" : "orthographic"}};
+  if (perspective) json["fov"] = camera.fov;
+  if (!perspective) json["height"] = camera.fittedHeight ? Json() : Json(camera.height);
+  json["fitted"] = camera.fitted;
+  json["keys"] = camera.keys.size();
+  json["shutter"] = {camera.shutter.x, camera.shutter.y};
+  json["aperture_radius"] = camera.apertureRadius;
+  const bool known = camera.focusDistance || (!camera.fitted && camera.keys.empty());
+  json["focus_distance"] = known ? Json(focusDistanceOf(camera)) : Json();
+  return json;
+}
+
+Json approximationsJson(const LightingSettings& lighting) {
+  return {{"subsample", lighting.autoSubsample ? Json("auto") : Json(lighting.subsample)},
+          {"compensate", lighting.compensate},
+          {"radius_scale", lighting.radiusScale},
+          {"error", lighting.error}};
+}
+
+std::string cameraText(const Json& camera) {
+  std::string text = camera["type"].get<std::string>();
+  if (camera.contains("fov")) text += fmt::format(", fov {:g}°", camera["fov"].get<double>());
+  if (camera.contains("height") && !camera["height"].is_null())
+    text += fmt::format(", height {:g}", camera["height"].get<double>());
+  if (camera["fitted"] == true) text += ", fitted to the particles";
+  const auto keys = camera["keys"].get<std::size_t>();
+  if (keys > 0) text += fmt::format(", {} {}", keys, keys == 1 ? "key" : "keys");
+  const double opens = camera["shutter"][0].get<double>(), closes = camera["shutter"][1].get<double>();
+  if (closes > opens) text += fmt::format(", shutter {:g} to {:g} s", opens, closes);
+  const double aperture = camera["aperture_radius"].get<double>();
+  if (aperture > 0) text += fmt::format(", aperture radius {:g}", aperture);
+  if (aperture > 0)
+    text += camera["focus_distance"].is_null() ? ", sharp at the target"
+                                               : fmt::format(", sharp at {:g}", camera["focus_distance"].get<double>());
+  return text;
+}
+
+/// "" where lighting is exact.
+std::string approximationsText(const Json& lighting) {
+  std::vector<std::string> parts;
+  const Json& share = lighting["subsample"];
+  const char* total = lighting["compensate"] == true ? "that stand for all" : "alone";
+  if (share.is_string()) {
+    parts.push_back(fmt::format("the smallest share of the particles within the error in the octree, {}", total));
+  } else if (share != 1.0) {
+    parts.push_back(fmt::format("{:g} % of the particles in the octree, {}", 100 * share.get<double>(), total));
+  }
+  if (lighting["radius_scale"] != 1.0)
+    parts.push_back(fmt::format("radii × {:g}", lighting["radius_scale"].get<double>()));
+  if (lighting["error"] != 0.0) parts.push_back(fmt::format("mean |ΔT| <= {:g}", lighting["error"].get<double>()));
+  return fmt::format("{}", fmt::join(parts, "; "));
 }
 
 }  // namespace
@@ -140,6 +237,9 @@ Json describeScene(const std::string& path) {
           {"particles", particles},
           {"sources", sources},
           {"lights", lights},
+          {"solids", solidsJson(scene)},
+          {"camera", cameraJson(scene.camera)},
+          {"lighting", approximationsJson(scene.lighting)},
           {"size", {scene.output.size.x, scene.output.size.y}},
           {"output", scene.output.file},
           {"frames", {{"first", scene.frames.first}, {"last", scene.frames.last}, {"step", scene.frames.step}}},
@@ -162,6 +262,11 @@ void printScene(const Json& info) {
   }
   const Json &frames = info["frames"], &estimate = info["estimate"];
   row("lights", listed(info["lights"]));
+  for (const Json& solid : info["solids"])
+    row("solid", fmt::format("{}: {}, {}", solid["name"].get<std::string>(), solid["mode"].get<std::string>(),
+                             solid["file"].get<std::string>()));
+  row("camera", cameraText(info["camera"]));
+  if (const std::string text = approximationsText(info["lighting"]); !text.empty()) row("lighting", text);
   row("picture", fmt::format("{} × {}, {}", info["size"][0].get<int>(), info["size"][1].get<int>(),
                              info["output"].get<std::string>()));
   row("frames", fmt::format("{} to {}, every {}", frames["first"].get<int>(), frames["last"].get<int>(),

@@ -21,7 +21,8 @@
 namespace mote {
 namespace {
 
-constexpr const char* kOurChannels[] = {"Position", "Radius", "Density", "Color", "Velocity", "ID"};
+constexpr const char* kOurChannels[] = {"Position",   "Radius",   "Density",  "Color",
+                                        "Absorption", "Emission", "Velocity", "ID"};
 constexpr std::size_t kGrain = 1 << 15;
 
 /// A source's particles and the name that messages about them start with.
@@ -69,7 +70,8 @@ void requireVector(const PrtReader& file, const std::string& name) {
 void checkChannelKeys(const ParticleSource& source) {
   for (const auto& [ours, theirs] : source.channels)
     if (std::find(std::begin(kOurChannels), std::end(kOurChannels), ours) == std::end(kOurChannels))
-      throw InputError(scenePlace(source), "channels", "Position, Radius, Density, Color, Velocity or ID",
+      throw InputError(scenePlace(source), "channels",
+                       "Position, Radius, Density, Color, Absorption, Emission, Velocity or ID",
                        fmt::format("'{}'", ours));
 }
 
@@ -113,6 +115,10 @@ Loaded readFile(const ParticleSource& source, const std::string& path) {
     requests.push_back({name.theirs, &set.color});
     loaded.hasColor = true;
   }
+  if (const auto name = nameOf(source, "Absorption"); wanted(source, file, "Absorption", name))
+    requests.push_back({name.theirs, &set.absorption});
+  if (const auto name = nameOf(source, "Emission"); wanted(source, file, "Emission", name))
+    requests.push_back({name.theirs, &set.emission});
   if (wanted(source, file, "Velocity", velocity)) {
     requireVector(file, velocity.theirs);
     requests.push_back({velocity.theirs, &set.velocity});
@@ -171,11 +177,25 @@ void checkScalars(const Loaded& loaded, const std::vector<float>& values, const 
                      zeroAllowed ? "a finite number ≥ 0" : "a finite number > 0", fmt::format("{}", values[i]));
 }
 
+/// Colours of any brightness.
+void checkAmounts(const Loaded& loaded, const std::vector<vec3>& values, const char* what, const char* when) {
+  const auto bad = [&](std::size_t k) {
+    const vec3& v = values[k];
+    return !isFinite(v) || v.x < 0 || v.y < 0 || v.z < 0;
+  };
+  const std::size_t i = firstWhere(values.size(), bad);
+  if (i < values.size())
+    throw InputError(loaded.place, fmt::format("particle {}: {}{}", i, what, when), "finite numbers ≥ 0",
+                     text(values[i]));
+}
+
 void check(const Loaded& loaded, const char* when) {
   checkVectors(loaded, loaded.set.position, "position", when);
   checkScalars(loaded, loaded.set.radius, "radius", when, false);
   checkScalars(loaded, loaded.set.density, "density", when, true);
   checkVectors(loaded, loaded.set.color, "colour", when);
+  checkAmounts(loaded, loaded.set.absorption, "absorption", when);
+  checkAmounts(loaded, loaded.set.emission, "emission", when);
   checkVectors(loaded, loaded.set.velocity, "velocity", when);
 }
 
@@ -231,11 +251,23 @@ void append(std::vector<T>& to, std::vector<T>& from) {
   std::vector<T>().swap(from);
 }
 
+/// What Color leaves of 1: the absorption with which Density is the whole extinction (where medium.albedo is 1).
+std::vector<vec3> restOfColor(const ParticleSet& set, const vec3& uniformColor) {
+  if (set.color.empty()) return std::vector<vec3>(set.size(), glm::max(vec3(0), vec3(1) - uniformColor));
+  std::vector<vec3> rest(set.size());
+  parallelBlocks(set.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) rest[i] = glm::max(vec3(0), vec3(1) - set.color[i]);
+  });
+  return rest;
+}
+
 /// Gives every part what any part has, so that the arrays can be appended.
 void alignChannels(const std::vector<ParticleSource>& sources, std::vector<Loaded>& parts, vec3& uniformColor) {
   const auto any = [&](auto&& has) { return std::any_of(parts.begin(), parts.end(), has); };
   const bool velocity = any([](const Loaded& p) { return !p.set.velocity.empty(); });
   const bool id = any([](const Loaded& p) { return !p.set.id.empty(); });
+  const bool absorption = any([](const Loaded& p) { return !p.set.absorption.empty(); });
+  const bool emission = any([](const Loaded& p) { return !p.set.emission.empty(); });
   uniformColor = sources[0].color;
   bool color = any([](const Loaded& p) { return p.hasColor; });
   for (const ParticleSource& source : sources) color = color || source.color != uniformColor;
@@ -243,6 +275,8 @@ void alignChannels(const std::vector<ParticleSource>& sources, std::vector<Loade
   for (std::size_t k = 0; k < parts.size(); ++k) {
     ParticleSet& set = parts[k].set;
     if (color && !parts[k].hasColor) set.color.assign(set.size(), sources[k].color);
+    if (absorption && set.absorption.empty()) set.absorption = restOfColor(set, sources[k].color);
+    if (emission && set.emission.empty()) set.emission.assign(set.size(), vec3(0));
     if (velocity && set.velocity.empty()) set.velocity.assign(set.size(), vec3(0));
     if (id && set.id.empty()) {
       set.id.resize(set.size());
@@ -262,6 +296,8 @@ ParticleSet merged(const std::vector<ParticleSource>& sources, std::vector<Loade
     append(all.radius, set.radius);
     append(all.density, set.density);
     append(all.color, set.color);
+    append(all.absorption, set.absorption);
+    append(all.emission, set.emission);
     append(all.velocity, set.velocity);
     append(all.id, set.id);
   }

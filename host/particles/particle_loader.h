@@ -11,17 +11,22 @@ namespace mote {
 /// Loads every source for `frame` ('####' in a file name is the frame, see framePath) and merges them in order.
 ///
 /// Our channels and what they are called in a file unless `ParticleSource::channels` says otherwise: Position (needed),
-/// Radius, Density, Color, Velocity, ID. Without Density or Color the source's `density` and `color` hold. Radius by
-/// the source's rule, in the file's own units: Auto takes the channel Radius if there is one (a generator's own radii),
-/// else 1.5 × meanNeighbourDistance for all of the source. Then scale, rotate about x, y, z and translate, in double;
-/// radii, whatever their rule, and velocities scale along, and cross-sections with the square (in mode Peak: densities
-/// stay). Where only some sources have Color, Velocity or ID, the rest get their `color`, zero, and the index in the
-/// result.
+/// Radius, Density, Color, Absorption, Emission, Velocity, ID. Colours may be grey (arity 1). Without Density or Color
+/// the source's `density` and `color` hold. Radius by the source's rule, in the file's own units: Auto takes the
+/// channel Radius if there is one (a generator's own radii), else 1.5 × meanNeighbourDistance for all of the source.
+/// Then scale, rotate about x, y, z and translate, in double; radii, whatever their rule, and velocities scale along,
+/// and cross-sections with the square (in mode Peak: densities stay); colour, absorption and emission stay.
+///
+/// Where only some sources have Color, Velocity, Emission or ID, the rest get their `color`, zero, zero, and the index
+/// in the result. Where only some have Absorption, the rest get what Color leaves of 1, max(0, 1 − Color): their
+/// extinction is then Density where medium.albedo is 1, and smaller by Density · Color · (1 − albedo) elsewhere. Give
+/// them the channel where that matters.
 ///
 /// `openedFiles`, if given, gets the path of every file read. Throws InputError: a missing file (with the nearest names
 /// or frames that exist), a channel that the file lacks (with those it has), no particles at all, a particle whose
-/// position, radius, density, colour or velocity is not finite, radius ≤ 0, density < 0 (with its index and value), no
-/// spacing to take a radius from. Costs: that of PrtReader, and 0.02 core-seconds for each million.
+/// position, radius, density, colour, absorption, emission or velocity is not finite, radius ≤ 0, density, absorption
+/// or emission < 0 (with its index and value), no spacing to take a radius from. Costs: that of PrtReader, and 0.02
+/// core-seconds for each million.
 ParticleSet loadParticles(const std::vector<ParticleSource>& sources, int frame,
                           DensityMode mode = DensityMode::CrossSection,
                           std::vector<std::string>* openedFiles = nullptr);

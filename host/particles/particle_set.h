@@ -9,18 +9,23 @@
 namespace mote {
 
 /// Structure of arrays. Every array has size() entries or, where the remark says so, none.
+///
+/// Where there is absorption, a particle's extinction per colour channel is
+///   density · (color · medium.albedo + absorption) · medium.extinction, else density · medium.extinction.
 struct ParticleSet {
-  std::vector<vec3> position;      ///< centre [scene units], finite
-  std::vector<float> radius;       ///< support radius r [scene units], finite, > 0
-  std::vector<float> density;      ///< channel Density: cross-section [scene units²], or optical depth in mode `peak`; finite, ≥ 0
-  std::vector<vec3> color;         ///< scattering albedo, RGB; empty: all of them `uniformColor`
-  std::vector<vec3> velocity;      ///< [scene units / s]; empty: no source has it
-  std::vector<std::uint64_t> id;   ///< empty: no source has it
+  std::vector<vec3> position;  ///< centre [scene units], finite
+  std::vector<float> radius;   ///< support radius r [scene units], finite, > 0
+  std::vector<float> density;  ///< Density: cross-section [scene units²], in mode `peak` optical depth; finite, ≥ 0
+  std::vector<vec3> color;     ///< scattering albedo, RGB; empty: all of them `uniformColor`
+  std::vector<vec3> velocity;  ///< [scene units / s]; empty: no source has it
+  std::vector<std::uint64_t> id;  ///< empty: no source has it
+  std::vector<vec3> absorption;   ///< RGB, relative to `density`, finite, ≥ 0; empty: no source has it
+  std::vector<vec3> emission;     ///< radiance, RGB [W/(m² sr)], finite, ≥ 0; empty: no source has it
   vec3 uniformColor{1};
 
   std::size_t size() const { return position.size(); }
-  Bounds bounds() const;           ///< of the centres
-  Bounds supportBounds() const;    ///< of the supports
+  Bounds bounds() const;         ///< of the centres
+  Bounds supportBounds() const;  ///< of the supports
 };
 
 /// Mean, least and greatest support radius.

@@ -253,6 +253,8 @@ std::vector<PrtColumn> columnsOf(const ParticleSet& set) {
   std::vector<PrtColumn> columns{PrtColumn::of("Position", set.position), PrtColumn::of("Radius", set.radius),
                                  PrtColumn::of("Density", set.density)};
   if (!set.color.empty()) columns.push_back(PrtColumn::of("Color", set.color));
+  if (!set.absorption.empty()) columns.push_back(PrtColumn::of("Absorption", set.absorption));
+  if (!set.emission.empty()) columns.push_back(PrtColumn::of("Emission", set.emission));
   if (!set.velocity.empty()) columns.push_back(PrtColumn::of("Velocity", set.velocity));
   if (!set.id.empty()) columns.push_back(PrtColumn::of("ID", set.id));
   return columns;

@@ -38,7 +38,8 @@ struct PrtWriteOptions {
 void writePrt(const std::string& path, std::span<const PrtColumn> columns, std::span<const PrtMetadata> metadata = {},
               const PrtWriteOptions& options = {});
 
-/// The set's own channels, in this order: Position, Radius, Density, and where it has them Color, Velocity, ID.
+/// The set's own channels, in this order: Position, Radius, Density, and where it has them Color, Absorption, Emission,
+/// Velocity, ID.
 std::vector<PrtColumn> columnsOf(const ParticleSet& set);
 
 }  // namespace mote

@@ -18,6 +18,7 @@ namespace mote {
 ///
 /// Computed in double, then rounded to the camera's floats. The result has no keys; `fitted` marks stay as they are.
 /// Throws InputError where the view is undefined (viewFault), or fov, height or focus distance leave their range.
+/// Cost: proportional to the number of keys, for moments of a frame and not for each particle.
 Camera cameraAt(const Camera& camera, double frame);
 
 /// The same without the check; for keys that are not in order, some finite camera or none.

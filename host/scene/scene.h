@@ -122,8 +122,8 @@ enum class Projection { Perspective, Orthographic };
 /// What the camera is at one frame; between keys it moves smoothly (camera_path.h).
 struct CameraKey {
   float frame = 1;  ///< may be fractional
-  std::optional<vec3> position, target, up;
-  std::optional<float> fov, height, focusDistance;
+  std::optional<vec3> position = std::nullopt, target = std::nullopt, up = std::nullopt;
+  std::optional<float> fov = std::nullopt, height = std::nullopt, focusDistance = std::nullopt;
 
   bool operator==(const CameraKey&) const = default;
 };

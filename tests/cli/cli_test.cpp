@@ -410,6 +410,76 @@ TEST(MoteInfo, GivesOneLineOfJsonAFile) {
   for (const char* name : {"p.exr", "s.json"}) EXPECT_EQ(test::mote({"info", folder.file(name)}).exitCode, 0) << name;
 }
 
+TEST(MoteInfo, ShowsTheRangesOfAbsorptionAndEmission) {
+  const TempFolder folder;
+  const std::vector<vec3> position{{0, 0, 0}, {1, 0, 0}}, absorption{{0, 1, 2}, {3, 0, 0}},
+      emission{{5, 6, 7}, {1, 8, 0}};
+  const std::vector<PrtColumn> columns{PrtColumn::of("Position", position), PrtColumn::of("Absorption", absorption),
+                                       PrtColumn::of("Emission", emission)};
+  writePrt(folder.file("x.prt"), columns);
+  const json channels = infoOf(folder.file("x.prt"))["channels"];
+  EXPECT_EQ(channels[1]["name"], "Absorption");
+  EXPECT_EQ(channels[1]["max"], (json{3, 1, 2}));
+  EXPECT_EQ(channels[2]["name"], "Emission");
+  EXPECT_EQ(channels[2]["min"], (json{1, 6, 0}));
+  // Both take memory: 12 bytes a particle each.
+  writePrt(folder.file("y.prt"), {columns.data(), 1});
+  const auto bytes = [&](const char* file) {
+    writeBytes(folder.file("s.json"), R"({"particles": [{"file": ")" + std::string(file) + R"(", "radius": 1}]})");
+    return infoOf(folder.file("s.json"))["estimate"]["host_bytes"].get<double>();
+  };
+  EXPECT_EQ(bytes("x.prt") - bytes("y.prt"), 2 * 24);
+}
+
+TEST(MoteInfo, DescribesThePartsOfAScene) {
+  const TempFolder folder;
+  writeBytes(folder.file("s.json"), R"({"particles": [{"generate": "ball", "count": 1000}],
+    "lights": [{"name": "a"}, {"name": "b", "type": "spot"}, {"name": "c", "type": "directional"}],
+    "lighting": {"subsample": 0.25, "error": 0.01, "radius_scale": 2},
+    "solids": [{"file": "ground.##.obj", "mode": "holdout"}, {"name": "pole", "file": "pole.obj", "casts_shadows": false}],
+    "camera": {"type": "orthographic", "position": [0, 0, 5], "target": [0, 0, 1], "height": 3, "shutter": [0, 0.25],
+               "aperture_radius": 0.5}})");
+  const json info = infoOf(folder.file("s.json"));
+  EXPECT_EQ(info["lights"][0]["type"], "point");
+  EXPECT_EQ(info["lights"][1]["type"], "spot");
+  EXPECT_EQ(info["lights"][2]["type"], "directional");
+  EXPECT_EQ(info["solids"][0]["name"], "solid0");
+  EXPECT_EQ(info["solids"][0]["file"], folder.file("ground.01.obj"));
+  EXPECT_EQ(info["solids"][0]["mode"], "holdout");
+  EXPECT_EQ(info["solids"][1]["casts_shadows"], false);
+  EXPECT_EQ(info["lighting"], (json{{"subsample", 0.25}, {"compensate", true}, {"radius_scale", 2}, {"error", 0.01f}}));
+  EXPECT_EQ(info["camera"], (json{{"type", "orthographic"},
+                                  {"height", 3},
+                                  {"fitted", false},
+                                  {"keys", 0},
+                                  {"shutter", {0, 0.25}},
+                                  {"aperture_radius", 0.5},
+                                  {"focus_distance", 4}}));
+  const ProcessResult text = test::mote({"info", folder.file("s.json")});
+  EXPECT_EQ(text.exitCode, 0) << text.err;
+  for (const char* part : {"a (point), b (spot), c (directional)", "solid0: holdout, ", "pole: shaded, ",
+                           "orthographic, height 3, shutter 0 to 0.25 s, aperture radius 0.5, sharp at 4",
+                           "25 % of the particles in the octree, that stand for all; radii × 2; mean |ΔT| <= 0.01"})
+    EXPECT_TRUE(contains(text.out, part)) << text.out;
+}
+
+TEST(MoteInfo, LeavesOpenWhatParticlesAndKeysDecide) {
+  const TempFolder folder;
+  writeBytes(folder.file("s.json"), R"({"particles": [{"generate": "ball", "count": 1000}],
+    "lighting": {"subsample": "auto", "error": 0.01},
+    "camera": {"type": "orthographic", "aperture_radius": 0.5, "keys": [{"frame": 1, "up": [0, 0, 1]}]}})");
+  const json info = infoOf(folder.file("s.json"));
+  EXPECT_EQ(info["camera"]["fitted"], true);
+  EXPECT_EQ(info["camera"]["keys"], 1);
+  EXPECT_TRUE(info["camera"]["height"].is_null());
+  EXPECT_TRUE(info["camera"]["focus_distance"].is_null());
+  EXPECT_EQ(info["lighting"]["subsample"], "auto");
+  const ProcessResult text = test::mote({"info", folder.file("s.json")});
+  for (const char* part : {"orthographic, fitted to the particles, 1 key, aperture radius 0.5, sharp at the target",
+                           "the smallest share of the particles within the error in the octree"})
+    EXPECT_TRUE(contains(text.out, part)) << text.out;
+}
+
 TEST(MoteInfo, NamesTheMissingParticleFileOfAScene) {
   const TempFolder folder;
   writeBytes(folder.file("s.json"), R"({"particles": [{"file": "gone.prt"}]})");
