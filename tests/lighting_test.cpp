@@ -183,7 +183,7 @@ TEST(Lighting, InScatteringFollowsTheInverseSquareAndTheIsotropicPhase) {
 TEST(RayOrder, TakesEverySlotOnce) {
   const Octree tree = ballCloud(10001, 18, 0.1, 0.1).tree(0, true, 1);
   for (const layout::Light& light : {pointLight({0, 0, 0}), pointLight({5, 0, 0}), directionalLight({0, 0, 1})}) {
-    std::vector<std::uint32_t> order = rayOrder(tree, light);
+    std::vector<std::uint32_t> order = rayOrder(slotsOf(tree), light);
     std::sort(order.begin(), order.end());
     ASSERT_EQ(order.size(), 10001u);
     for (std::uint32_t i = 0; i < order.size(); ++i) ASSERT_EQ(order[i], i);

@@ -11,10 +11,10 @@ namespace mote {
 struct WalkOptions {
   layout::uint falloff = layout::kFalloffSmooth;
   layout::uint endpoint = layout::kEndpointSoft;
-  float opticalDepthLimit = std::numeric_limits<float>::infinity();  ///< stop once every ray is beyond
+  float opticalDepthLimit = std::numeric_limits<float>::infinity();  ///< stop once every ray is beyond, in every channel
 };
 
-/// Adds every particle's share to packet.opticalDepth.
+/// Adds every particle's share to packet.opticalDepth, channel by channel of the tree.
 void walkScalar(const Octree& tree, const WalkOptions& options, Packet& packet);
 /// The same with the best instruction set of this machine, chosen at the first call (Google Highway).
 void walkSimd(const Octree& tree, const WalkOptions& options, Packet& packet);

@@ -27,17 +27,37 @@ Passage passage(const Packet& packet, const Rays& rays, int lane, const vec3& po
   return {along, squaredAt(packet, rays, lane, point, along)};
 }
 
+/// Optical depth through a particle's centre in each channel.
+template <int kChannels>
+struct Peaks {
+  float of[kChannels];
+};
+
+template <int kChannels>
+Peaks<kChannels> peaksOf(const Octree& tree, std::uint32_t slot) {
+  if constexpr (kChannels == 1)
+    return {{tree.peak[slot]}};
+  else
+    return {{tree.peak[slot], tree.peakGreen[slot], tree.peakBlue[slot]}};
+}
+
+template <int kChannels>
+void addShare(Packet& packet, int lane, const Peaks<kChannels>& peaks, float share) {
+  for (int channel = 0; channel < kChannels; ++channel) packet.opticalDepth[channel][lane] += peaks.of[channel] * share;
+}
+
 /// A particle that lies wholly between the ends of every ray it can meet.
-template <layout::uint kFalloff>
-void addBetween(Packet& packet, const Rays& rays, const vec3& point, float inverseSquare, float peak) {
+template <int kChannels, layout::uint kFalloff>
+void addBetween(Packet& packet, const Rays& rays, const vec3& point, float inverseSquare,
+                const Peaks<kChannels>& peaks) {
   for (int lane = 0; lane < kPacketRays; ++lane)
-    packet.opticalDepth[lane] += peak * falloff<kFalloff>(passage(packet, rays, lane, point).squared * inverseSquare);
+    addShare(packet, lane, peaks, falloff<kFalloff>(passage(packet, rays, lane, point).squared * inverseSquare));
 }
 
 /// A particle that may straddle an end, or be the ray's own.
-template <layout::uint kFalloff, layout::uint kEndpoint>
-void addNearEnd(Packet& packet, const Rays& rays, const vec3& point, float radius, float inverseSquare, float peak,
-                std::uint32_t slot) {
+template <int kChannels, layout::uint kFalloff, layout::uint kEndpoint>
+void addNearEnd(Packet& packet, const Rays& rays, const vec3& point, float radius, float inverseSquare,
+                const Peaks<kChannels>& peaks, std::uint32_t slot) {
   for (int lane = 0; lane < kPacketRays; ++lane) {
     const Passage p = passage(packet, rays, lane, point);
     float share;
@@ -51,11 +71,11 @@ void addNearEnd(Packet& packet, const Rays& rays, const vec3& point, float radiu
       const float along = std::min(std::max(p.along, -rays.before[lane]), rays.after[lane]);
       share = falloff<kFalloff>(squaredAt(packet, rays, lane, point, along) * inverseSquare);
     }
-    packet.opticalDepth[lane] += packet.self[lane] == slot ? 0.0f : peak * share;
+    if (packet.self[lane] != slot) addShare(packet, lane, peaks, share);
   }
 }
 
-template <layout::uint kFalloff, layout::uint kEndpoint>
+template <int kChannels, layout::uint kFalloff, layout::uint kEndpoint>
 void addLeaf(const Octree& tree, const layout::Node& leaf, std::uint32_t end, Packet& packet) {
   Rays moved;
   const bool far = isFar(packet, centreOf(leaf));
@@ -68,19 +88,22 @@ void addLeaf(const Octree& tree, const layout::Node& leaf, std::uint32_t end, Pa
     if (!stands.candidate || !(radius > 0)) continue;
     const float inverseSquare = 1.0f / (radius * radius);
     if (stands.between)
-      addBetween<kFalloff>(packet, rays, centre - rays.base, inverseSquare, tree.peak[slot]);
+      addBetween<kChannels, kFalloff>(packet, rays, centre - rays.base, inverseSquare, peaksOf<kChannels>(tree, slot));
     else
-      addNearEnd<kFalloff, kEndpoint>(packet, rays, centre - rays.base, radius, inverseSquare, tree.peak[slot], slot);
+      addNearEnd<kChannels, kFalloff, kEndpoint>(packet, rays, centre - rays.base, radius, inverseSquare,
+                                                 peaksOf<kChannels>(tree, slot), slot);
   }
 }
 
+template <int kChannels>
 bool allBeyond(const Packet& packet, float limit) {
-  for (int lane = 0; lane < kPacketRays; ++lane)
-    if (!(packet.opticalDepth[lane] > limit)) return false;
+  for (int channel = 0; channel < kChannels; ++channel)
+    for (int lane = 0; lane < kPacketRays; ++lane)
+      if (!(packet.opticalDepth[channel][lane] > limit)) return false;
   return true;
 }
 
-template <layout::uint kFalloff, layout::uint kEndpoint>
+template <int kChannels, layout::uint kFalloff, layout::uint kEndpoint>
 void walk(const Octree& tree, float limit, Packet& packet) {
   const auto count = static_cast<std::uint32_t>(tree.nodeCount());
   for (std::uint32_t index = 0; index < count;) {
@@ -90,8 +113,8 @@ void walk(const Octree& tree, float limit, Packet& packet) {
       continue;
     }
     if (node.skip == ++index) {  // a leaf
-      addLeaf<kFalloff, kEndpoint>(tree, node, tree.nodes[node.skip].first, packet);
-      if (allBeyond(packet, limit)) return;
+      addLeaf<kChannels, kFalloff, kEndpoint>(tree, node, tree.nodes[node.skip].first, packet);
+      if (allBeyond<kChannels>(packet, limit)) return;
     }
   }
 }
@@ -100,7 +123,10 @@ void walk(const Octree& tree, float limit, Packet& packet) {
 
 void walkScalar(const Octree& tree, const WalkOptions& options, Packet& packet) {
   withRule(options.falloff, options.endpoint, [&]<layout::uint kFalloff, layout::uint kEndpoint>() {
-    walk<kFalloff, kEndpoint>(tree, options.opticalDepthLimit, packet);
+    if (tree.channels() == 1)
+      walk<1, kFalloff, kEndpoint>(tree, options.opticalDepthLimit, packet);
+    else
+      walk<3, kFalloff, kEndpoint>(tree, options.opticalDepthLimit, packet);
   });
 }
 

@@ -67,17 +67,19 @@ HWY_INLINE Vec capOf(Vec t, Vec halfChord) {
 }
 
 /// The sums so far. Passed by value to what is not inlined, so that the hot loop keeps them in registers.
+template <int kChannels>
 struct Depths {
-  Vec of[kVectors];
+  Vec of[kChannels][kVectors];
 };
 
 /// One particle in all lanes, relative to the rays' base.
+template <int kChannels>
 struct Particle {
-  Vec x, y, z, inverseSquare, peak;
+  Vec x, y, z, inverseSquare, peak[kChannels];
 };
 
-template <layout::uint kFalloff>
-HWY_INLINE void addBetween(const RayVectors& rays, const Particle& p, Depths& depths) {
+template <int kChannels, layout::uint kFalloff>
+HWY_INLINE void addBetween(const RayVectors& rays, const Particle<kChannels>& p, Depths<kChannels>& depths) {
   for (int v = 0; v < kVectors; ++v) {
     const Vec dx = hn::Sub(p.x, rays.originX[v]), dy = hn::Sub(p.y, rays.originY[v]),
               dz = hn::Sub(p.z, rays.originZ[v]);
@@ -85,13 +87,14 @@ HWY_INLINE void addBetween(const RayVectors& rays, const Particle& p, Depths& de
     const Vec ex = hn::Sub(dx, hn::Mul(t, rays.directionX[v])), ey = hn::Sub(dy, hn::Mul(t, rays.directionY[v])),
               ez = hn::Sub(dz, hn::Mul(t, rays.directionZ[v]));
     const Vec q = hn::Mul(dot3(ex, ey, ez, ex, ey, ez), p.inverseSquare);
-    depths.of[v] = hn::Add(depths.of[v], hn::Mul(p.peak, falloffOf<kFalloff>(q)));
+    const Vec share = falloffOf<kFalloff>(q);
+    for (int c = 0; c < kChannels; ++c) depths.of[c][v] = hn::Add(depths.of[c][v], hn::Mul(p.peak[c], share));
   }
 }
 
-template <layout::uint kFalloff, layout::uint kEndpoint>
-HWY_INLINE void addNearEnd(const Packet& packet, const Rays& rays, const RayVectors& r, const Particle& p, float radius,
-                           std::uint32_t slot, Depths& depths) {
+template <int kChannels, layout::uint kFalloff, layout::uint kEndpoint>
+HWY_INLINE void addNearEnd(const Packet& packet, const Rays& rays, const RayVectors& r, const Particle<kChannels>& p,
+                           float radius, std::uint32_t slot, Depths<kChannels>& depths) {
   const hn::RebindToUnsigned<Tag> slotTag;
   for (int v = 0; v < kVectors; ++v) {
     const Vec dx = hn::Sub(p.x, r.originX[v]), dy = hn::Sub(p.y, r.originY[v]), dz = hn::Sub(p.z, r.originZ[v]);
@@ -113,7 +116,8 @@ HWY_INLINE void addNearEnd(const Packet& packet, const Rays& rays, const RayVect
     }
     const auto isSelf =
         hn::RebindMask(kTag, hn::Eq(hn::Load(slotTag, packet.self + v * kLanes), hn::Set(slotTag, slot)));
-    depths.of[v] = hn::Add(depths.of[v], hn::IfThenZeroElse(isSelf, hn::Mul(p.peak, share)));
+    for (int c = 0; c < kChannels; ++c)
+      depths.of[c][v] = hn::Add(depths.of[c][v], hn::IfThenZeroElse(isSelf, hn::Mul(p.peak[c], share)));
   }
 }
 
@@ -152,9 +156,9 @@ HWY_INLINE StandingBits standingBits(const Octree& tree, const Packet& packet, s
   return bits;
 }
 
-template <layout::uint kFalloff, layout::uint kEndpoint>
+template <int kChannels, layout::uint kFalloff, layout::uint kEndpoint>
 HWY_INLINE void addLeaf(const Octree& tree, std::uint32_t begin, std::uint32_t end, const Packet& packet,
-                        const Rays& rays, const RayVectors& vectors, Depths& depths) {
+                        const Rays& rays, const RayVectors& vectors, Depths<kChannels>& depths) {
   for (std::uint32_t group = begin; group < end; group += kPacketRays) {
     const StandingBits bits = standingBits(tree, packet, group);
     const std::uint32_t inLeaf = end - group >= kPacketRays ? 0xffffu : (1u << (end - group)) - 1;
@@ -162,37 +166,47 @@ HWY_INLINE void addLeaf(const Octree& tree, std::uint32_t begin, std::uint32_t e
       const auto bit = static_cast<std::uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
       const std::uint32_t slot = group + bit;
       const float radius = tree.radius[slot];
-      const Particle particle{hn::Set(kTag, tree.x[slot] - rays.base.x), hn::Set(kTag, tree.y[slot] - rays.base.y),
-                              hn::Set(kTag, tree.z[slot] - rays.base.z), hn::Set(kTag, 1.0f / (radius * radius)),
-                              hn::Set(kTag, tree.peak[slot])};
+      Particle<kChannels> particle;
+      particle.x = hn::Set(kTag, tree.x[slot] - rays.base.x);
+      particle.y = hn::Set(kTag, tree.y[slot] - rays.base.y);
+      particle.z = hn::Set(kTag, tree.z[slot] - rays.base.z);
+      particle.inverseSquare = hn::Set(kTag, 1.0f / (radius * radius));
+      particle.peak[0] = hn::Set(kTag, tree.peak[slot]);
+      if constexpr (kChannels == 3) {
+        particle.peak[1] = hn::Set(kTag, tree.peakGreen[slot]);
+        particle.peak[2] = hn::Set(kTag, tree.peakBlue[slot]);
+      }
       if (bits.between >> bit & 1)
-        addBetween<kFalloff>(vectors, particle, depths);
+        addBetween<kChannels, kFalloff>(vectors, particle, depths);
       else
-        addNearEnd<kFalloff, kEndpoint>(packet, rays, vectors, particle, radius, slot, depths);
+        addNearEnd<kChannels, kFalloff, kEndpoint>(packet, rays, vectors, particle, radius, slot, depths);
     }
   }
 }
 
-template <layout::uint kFalloff, layout::uint kEndpoint>
-HWY_NOINLINE Depths addFarLeaf(const Octree& tree, const layout::Node& leaf, std::uint32_t end, const Packet& packet,
-                               Depths depths) {
+template <int kChannels, layout::uint kFalloff, layout::uint kEndpoint>
+HWY_NOINLINE Depths<kChannels> addFarLeaf(const Octree& tree, const layout::Node& leaf, std::uint32_t end,
+                                          const Packet& packet, Depths<kChannels> depths) {
   Rays moved;
   rebase(packet, centreOf(leaf), moved);
-  addLeaf<kFalloff, kEndpoint>(tree, leaf.first, end, packet, moved, loadRays(packet, moved), depths);
+  addLeaf<kChannels, kFalloff, kEndpoint>(tree, leaf.first, end, packet, moved, loadRays(packet, moved), depths);
   return depths;
 }
 
-HWY_INLINE bool allBeyond(const Depths& depths, float limit) {
-  for (int v = 0; v < kVectors; ++v)
-    if (!hn::AllTrue(kTag, hn::Gt(depths.of[v], hn::Set(kTag, limit)))) return false;
+template <int kChannels>
+HWY_INLINE bool allBeyond(const Depths<kChannels>& depths, float limit) {
+  for (int c = 0; c < kChannels; ++c)
+    for (int v = 0; v < kVectors; ++v)
+      if (!hn::AllTrue(kTag, hn::Gt(depths.of[c][v], hn::Set(kTag, limit)))) return false;
   return true;
 }
 
-template <layout::uint kFalloff, layout::uint kEndpoint>
+template <int kChannels, layout::uint kFalloff, layout::uint kEndpoint>
 HWY_NOINLINE void walk(const Octree& tree, float limit, Packet& packet) {
   const RayVectors vectors = loadRays(packet, packet.rays);
-  Depths depths;
-  for (int v = 0; v < kVectors; ++v) depths.of[v] = hn::Load(kTag, packet.opticalDepth + v * kLanes);
+  Depths<kChannels> depths;
+  for (int c = 0; c < kChannels; ++c)
+    for (int v = 0; v < kVectors; ++v) depths.of[c][v] = hn::Load(kTag, packet.opticalDepth[c] + v * kLanes);
   const layout::Node* nodes = tree.nodes.data();
   const auto count = static_cast<std::uint32_t>(tree.nodeCount());
   for (std::uint32_t index = 0; index < count;) {
@@ -204,30 +218,35 @@ HWY_NOINLINE void walk(const Octree& tree, float limit, Packet& packet) {
     if (node.skip == ++index) {  // a leaf
       const std::uint32_t end = nodes[index].first;
       if (isFar(packet, centreOf(node)))
-        depths = addFarLeaf<kFalloff, kEndpoint>(tree, node, end, packet, depths);
+        depths = addFarLeaf<kChannels, kFalloff, kEndpoint>(tree, node, end, packet, depths);
       else
-        addLeaf<kFalloff, kEndpoint>(tree, node.first, end, packet, packet.rays, vectors, depths);
+        addLeaf<kChannels, kFalloff, kEndpoint>(tree, node.first, end, packet, packet.rays, vectors, depths);
       if (allBeyond(depths, limit)) break;
     }
   }
-  for (int v = 0; v < kVectors; ++v) hn::Store(depths.of[v], kTag, packet.opticalDepth + v * kLanes);
+  for (int c = 0; c < kChannels; ++c)
+    for (int v = 0; v < kVectors; ++v) hn::Store(depths.of[c][v], kTag, packet.opticalDepth[c] + v * kLanes);
+}
+
+template <int kChannels, layout::uint kFalloff>
+void walkEnds(const Octree& tree, const WalkOptions& options, Packet& packet) {
+  if (options.endpoint == layout::kEndpointClamp)
+    walk<kChannels, kFalloff, layout::kEndpointClamp>(tree, options.opticalDepthLimit, packet);
+  else
+    walk<kChannels, kFalloff, layout::kEndpointSoft>(tree, options.opticalDepthLimit, packet);
+}
+
+template <int kChannels>
+void walkFalloff(const Octree& tree, const WalkOptions& options, Packet& packet) {
+  switch (options.falloff) {
+    case layout::kFalloffLinear: return walkEnds<kChannels, layout::kFalloffLinear>(tree, options, packet);
+    case layout::kFalloffSphere: return walkEnds<kChannels, layout::kFalloffSphere>(tree, options, packet);
+    default: return walkEnds<kChannels, layout::kFalloffSmooth>(tree, options, packet);
+  }
 }
 
 void walkRule(const Octree& tree, const WalkOptions& options, Packet& packet) {
-  using namespace layout;
-  const bool clamp = options.endpoint == kEndpointClamp;
-  const float limit = options.opticalDepthLimit;
-  switch (options.falloff) {
-    case kFalloffLinear:
-      return clamp ? walk<kFalloffLinear, kEndpointClamp>(tree, limit, packet)
-                   : walk<kFalloffLinear, kEndpointSoft>(tree, limit, packet);
-    case kFalloffSphere:
-      return clamp ? walk<kFalloffSphere, kEndpointClamp>(tree, limit, packet)
-                   : walk<kFalloffSphere, kEndpointSoft>(tree, limit, packet);
-    default:
-      return clamp ? walk<kFalloffSmooth, kEndpointClamp>(tree, limit, packet)
-                   : walk<kFalloffSmooth, kEndpointSoft>(tree, limit, packet);
-  }
+  return tree.channels() == 1 ? walkFalloff<1>(tree, options, packet) : walkFalloff<3>(tree, options, packet);
 }
 
 }  // namespace mote::HWY_NAMESPACE

@@ -4,6 +4,7 @@
 
 #include "host/core/error.h"
 #include "host/core/parallel.h"
+#include "host/lighting/irradiance.h"
 #include "host/lighting/kernel.h"
 #include "host/lighting/ray_order.h"
 
@@ -15,30 +16,33 @@ constexpr std::size_t kTaskRays = 64 * kPacketRays;
 
 using Walk = void (*)(const Octree&, const WalkOptions&, Packet&);
 
-bool shadowless(const layout::Light& light) { return light.castsShadows == 0 || light.shadowDensity == 0; }
-
 WalkOptions walkOptions(const layout::Light& light, const LightingOptions& options) {
-  return {options.falloff, options.endpoint, opticalDepthLimit(light, options.cutoff)};
+  return {options.falloff, options.endpoint, opticalDepthLimit(light, options)};
 }
 
-void storePacket(const Packet& packet, int count, std::vector<float>& depths) {
-  for (int lane = 0; lane < count; ++lane)
-    depths[packet.self[lane]] = packet.exactLength[lane] > 0 ? packet.opticalDepth[lane] : 0.0f;
+void storePacket(const Packet& packet, const std::uint32_t* indices, int count, std::size_t channels,
+                 std::size_t receivers, float* depths) {
+  for (std::size_t channel = 0; channel < channels; ++channel)
+    for (int lane = 0; lane < count; ++lane)
+      depths[channel * receivers + indices[lane]] =
+          packet.exactLength[lane] > 0 ? packet.opticalDepth[channel][lane] : 0.0f;
 }
 
-std::vector<float> walkAll(const Octree& tree, const layout::Light& light, const LightingOptions& options,
-                           const RaysDone& done, Walk walk) {
-  std::vector<float> depths(tree.particleCount(), 0.0f);
-  if (shadowless(light)) return depths;
+std::vector<float> walkAll(const Octree& tree, const Receivers& receivers, const layout::Light& light,
+                           const LightingOptions& options, std::span<const std::uint8_t> reached, const RaysDone& done,
+                           Walk walk) {
+  if (!reached.empty()) MOTE_CHECK(reached.size(), ==, receivers.size());
+  std::vector<float> depths(tree.channels() * receivers.size(), 0.0f);
+  if (shadowless(light) || tree.particleCount() == 0) return depths;
   const WalkOptions rules = walkOptions(light, options);
-  const PacketRules shape = packetRules(tree);
-  const std::vector<std::uint32_t> order = rayOrder(tree, light);
-  parallelBlocks(tree.particleCount(), kTaskRays, [&](std::size_t begin, std::size_t end) {
+  const PacketRules shape = packetRules(tree, receivers.bounds());
+  const std::vector<std::uint32_t> order = rayOrder(receivers, light, reached);
+  parallelBlocks(order.size(), kTaskRays, [&](std::size_t begin, std::size_t end) {
     for (std::size_t first = begin; first < end; first += kPacketRays) {
       const int count = static_cast<int>(std::min<std::size_t>(kPacketRays, end - first));
-      Packet packet = makePacket(tree, light, &order[first], count, shape);
+      Packet packet = makePacket(receivers, light, &order[first], count, shape);
       walk(tree, rules, packet);
-      storePacket(packet, count, depths);
+      storePacket(packet, &order[first], count, tree.channels(), receivers.size(), depths.data());
     }
     if (done) done(end - begin);
   });
@@ -47,26 +51,65 @@ std::vector<float> walkAll(const Octree& tree, const layout::Light& light, const
 
 }  // namespace
 
-float opticalDepthLimit(const layout::Light& light, float cutoff) {
-  if (cutoff <= 0 || light.shadowDensity <= 0) return std::numeric_limits<float>::infinity();
-  return -std::log(cutoff) / light.shadowDensity;
+Bounds Receivers::bounds() const {
+  constexpr std::size_t kGrain = 1 << 14;
+  std::vector<Bounds> parts((size() + kGrain - 1) / kGrain);
+  parallelBlocks(size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) parts[begin / kGrain].add(position(k));
+  });
+  Bounds bounds;
+  for (const Bounds& part : parts) bounds.add(part);
+  return bounds;
+}
+
+bool shadowless(const layout::Light& light) { return light.castsShadows == 0 || light.shadowDensity == 0; }
+
+float opticalDepthLimit(const layout::Light& light, const LightingOptions& options) {
+  const vec3& e = options.extinction;
+  const float least = light.shadowDensity * std::min({e.x, e.y, e.z});
+  if (options.cutoff <= 0 || least <= 0) return std::numeric_limits<float>::infinity();
+  return -std::log(options.cutoff) / least;
+}
+
+std::vector<float> opticalDepths(const Octree& tree, const Receivers& receivers, const layout::Light& light,
+                                 const LightingOptions& options, std::span<const std::uint8_t> reached,
+                                 const RaysDone& done) {
+  return walkAll(tree, receivers, light, options, reached, done, walkSimd);
 }
 
 std::vector<float> opticalDepths(const Octree& tree, const layout::Light& light, const LightingOptions& options,
                                  const RaysDone& done) {
-  return walkAll(tree, light, options, done, walkSimd);
+  return walkAll(tree, slotsOf(tree), light, options, {}, done, walkSimd);
+}
+
+std::vector<float> opticalDepthsScalar(const Octree& tree, const Receivers& receivers, const layout::Light& light,
+                                       const LightingOptions& options, std::span<const std::uint8_t> reached) {
+  return walkAll(tree, receivers, light, options, reached, {}, walkScalar);
 }
 
 std::vector<float> opticalDepthsScalar(const Octree& tree, const layout::Light& light, const LightingOptions& options) {
-  return walkAll(tree, light, options, {}, walkScalar);
+  return opticalDepthsScalar(tree, slotsOf(tree), light, options);
+}
+
+std::vector<float> transmittances(const std::vector<float>& opticalDepths, std::size_t receivers,
+                                  const layout::Light& light, const vec3& extinction) {
+  const bool grey = opticalDepths.size() == receivers;
+  if (!grey) MOTE_CHECK(opticalDepths.size(), ==, 3 * receivers);
+  const bool oneChannel = grey && extinction.x == extinction.y && extinction.y == extinction.z;
+  // Without shadows T is 1 even where the optical depth is not known.
+  const float density = light.castsShadows != 0 ? light.shadowDensity : 0;
+  std::vector<float> result((oneChannel ? 1 : 3) * receivers);
+  parallelBlocks(result.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const float factor = -density * extinction[static_cast<int>(i / receivers)];
+      result[i] = std::exp(factor * opticalDepths[grey ? i % receivers : i]);
+    }
+  });
+  return result;
 }
 
 std::vector<float> transmittances(const std::vector<float>& opticalDepths, const layout::Light& light) {
-  std::vector<float> result(opticalDepths.size());
-  parallelBlocks(result.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) result[i] = std::exp(-light.shadowDensity * opticalDepths[i]);
-  });
-  return result;
+  return transmittances(opticalDepths, opticalDepths.size(), light, vec3(1));
 }
 
 std::vector<float> lineOpticalDepths(const Octree& tree, std::span<const vec3> points, std::span<const vec3> directions,
@@ -75,31 +118,37 @@ std::vector<float> lineOpticalDepths(const Octree& tree, std::span<const vec3> p
   std::vector<float> depths(points.size(), 0.0f);
   const Bounds bounds = tree.bounds();
   if (bounds.empty()) return depths;
-  const PacketRules shape = packetRules(tree);
+  const PacketRules shape = packetRules(tree, {});
   const float away = 2 * glm::length(bounds.size());
   parallelBlocks(points.size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       // From a start outside everything, the ray is the whole line.
       Packet packet = makeLinePacket(points[i] - away * directions[i], directions[i], shape);
       walkSimd(tree, {falloff, layout::kEndpointSoft, std::numeric_limits<float>::infinity()}, packet);
-      depths[i] = packet.opticalDepth[0];
+      depths[i] = packet.opticalDepth[0][0];
     }
   });
   return depths;
 }
 
-void addInScattering(const Octree& tree, const layout::Light& light, const std::vector<float>& transmittance,
-                     std::vector<vec3>& radiance) {
-  constexpr float kIsotropic = static_cast<float>(1 / (4 * kPi));
-  const vec3 scattered = kIsotropic * light.power;
-  parallelBlocks(tree.particleCount(), 1 << 14, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t slot = begin; slot < end; ++slot) {
-      float strength = transmittance[slot];
-      if (light.type == layout::kLightPoint && light.decay > 0) {
-        const float distance = std::max(glm::length(light.position - tree.position(slot)), tree.radius[slot]);
-        strength *= light.decay == 2 ? 1 / (distance * distance) : std::pow(distance, -light.decay);
-      }
-      radiance[slot] += strength * scattered;
+void addInScattering(const Receivers& receivers, std::span<const float> radius, const layout::Light& light,
+                     std::span<const float> transmittance, std::span<const float> visibility,
+                     const Scattering& scattering, std::vector<vec3>& radiance) {
+  const std::size_t count = receivers.size();
+  MOTE_CHECK(radius.size(), ==, count);
+  MOTE_CHECK(radiance.size(), ==, count);
+  const bool grey = transmittance.size() == count;
+  if (!grey) MOTE_CHECK(transmittance.size(), ==, 3 * count);
+  parallelBlocks(count, 1 << 14, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const vec3 point = receivers.position(k);
+      const float cosine = scattering.phase.kind == PhaseKind::Isotropic
+                               ? 0.0f
+                               : glm::dot(travelDirection(light, point), scattering.viewer.directionFrom(point));
+      const vec3 passes = grey ? vec3(transmittance[k])
+                               : vec3(transmittance[k], transmittance[count + k], transmittance[2 * count + k]);
+      const float share = scattering.phase(cosine) * (visibility.empty() ? 1.0f : visibility[k]);
+      radiance[k] += share * passes * irradiance(light, point, radius[k]);
     }
   });
 }

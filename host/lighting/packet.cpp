@@ -22,7 +22,7 @@ void setRay(Packet& packet, int lane, const vec3& origin, const dvec3& direction
   packet.directionY[lane] = static_cast<float>(direction.y);
   packet.directionZ[lane] = static_cast<float>(direction.z);
   packet.self[lane] = self;
-  packet.opticalDepth[lane] = 0;
+  for (auto& channel : packet.opticalDepth) channel[lane] = 0;
 }
 
 void setAxis(Packet& packet, const vec3& origin, const vec3& toLight, bool infinite) {
@@ -61,13 +61,13 @@ void setShaft(Packet& packet, const PacketRules& rules) {
 
 }  // namespace
 
-Packet makePacket(const Octree& tree, const layout::Light& light, const std::uint32_t* slots, int count,
+Packet makePacket(const Receivers& receivers, const layout::Light& light, const std::uint32_t* indices, int count,
                   const PacketRules& rules) {
   Packet packet;
   Bounds origins;
   for (int lane = 0; lane < kPacketRays; ++lane) {
-    const std::uint32_t self = slots[std::min(lane, count - 1)];
-    const vec3 origin = tree.position(self);
+    const std::uint32_t index = indices[std::min(lane, count - 1)], self = receivers.selfOf(index);
+    const vec3 origin = receivers.position(index);
     origins.add(origin);
     if (light.type == layout::kLightDirectional) {
       setRay(packet, lane, origin, -glm::normalize(dvec3(light.direction)), kInfinity, self);
@@ -93,9 +93,10 @@ Packet makeLinePacket(const vec3& origin, const vec3& direction, const PacketRul
   return packet;
 }
 
-PacketRules packetRules(const Octree& tree) {
-  const Bounds bounds = tree.bounds();
+PacketRules packetRules(const Octree& tree, const Bounds& origins) {
+  Bounds bounds = tree.bounds();
   if (bounds.empty()) return {0, 0};
+  if (!origins.empty()) bounds.add(origins);
   const float extent =
       std::max(glm::length(bounds.size()), glm::length(glm::max(glm::abs(bounds.lo), glm::abs(bounds.hi))));
   // Coordinates, differences and directions each round to 6e-8 of the extent; 2e-6 leaves a factor of ten.

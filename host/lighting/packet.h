@@ -29,8 +29,8 @@ struct Packet {
   Rays rays;  ///< base 0: origins are the particles, before 0, after the length
   alignas(64) float directionX[kPacketRays], directionY[kPacketRays],
       directionZ[kPacketRays];                  ///< unit, toward the light
-  alignas(64) std::uint32_t self[kPacketRays];  ///< slot that the ray leaves out, or kNoSlot
-  alignas(64) float opticalDepth[kPacketRays];  ///< the sum so far; starts at 0
+  alignas(64) std::uint32_t self[kPacketRays];     ///< slot that the ray leaves out, or kNoSlot
+  alignas(64) float opticalDepth[3][kPacketRays];  ///< the sums so far, as many as the tree has channels; start at 0
   /// Directions and lengths before rounding, for rebase().
   alignas(64) double exactX[kPacketRays], exactY[kPacketRays], exactZ[kPacketRays], exactLength[kPacketRays];
 
@@ -53,12 +53,13 @@ struct PacketRules {
   float slack;        ///< for boxes and tubes: rounding of coordinates and directions, relative to the scene's extent
   float farDistance;  ///< 256 times the least radius: there the error of τ reaches 1e-4
 };
-PacketRules packetRules(const Octree& tree);
+/// `origins` bounds the rays' starts.
+PacketRules packetRules(const Octree& tree, const Bounds& origins);
 
-/// Rays from `count` slots toward the light, 1 ≤ count ≤ 16. Lanes beyond count repeat the last ray.
-/// A ray whose particle sits exactly at the light has length 0 and some direction: its sum means nothing, and the
+/// Rays from the receivers indices[0 … count) toward the light, 1 ≤ count ≤ 16. Lanes beyond count repeat the last ray.
+/// A ray whose receiver sits exactly at the light has length 0 and some direction: its sum means nothing, and the
 /// caller takes 0 instead.
-Packet makePacket(const Octree& tree, const layout::Light& light, const std::uint32_t* slots, int count,
+Packet makePacket(const Receivers& receivers, const layout::Light& light, const std::uint32_t* indices, int count,
                   const PacketRules& rules);
 
 /// One infinite ray, in all lanes, that leaves no particle out.

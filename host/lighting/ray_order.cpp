@@ -22,7 +22,7 @@ struct Crossing {
 class LightPlane {
  public:
   LightPlane(const layout::Light& light, const vec3& centre) : centre_(centre) {
-    const bool point = light.type == layout::kLightPoint;
+    const bool point = light.type != layout::kLightDirectional;
     vec3 toLight = point ? light.position - centre : -light.direction;
     distance_ = point ? glm::length(toLight) : std::numeric_limits<float>::infinity();
     toLight = glm::length(toLight) > 0 ? glm::normalize(toLight) : vec3(1, 0, 0);
@@ -65,17 +65,26 @@ void splitEvenly(Crossing* begin, Crossing* end, std::size_t piece) {
   splitEvenly<kField>(middle, end, piece);
 }
 
+/// The indices that are reached, ascending.
+std::vector<std::uint32_t> indicesOf(std::size_t count, std::span<const std::uint8_t> reached) {
+  std::vector<std::uint32_t> indices;
+  indices.reserve(count);
+  for (std::size_t k = 0; k < count; ++k)
+    if (reached.empty() || reached[k] != 0) indices.push_back(static_cast<std::uint32_t>(k));
+  return indices;
+}
+
 }  // namespace
 
-std::vector<std::uint32_t> rayOrder(const Octree& tree, const layout::Light& light) {
-  std::vector<std::uint32_t> order(tree.particleCount());
+std::vector<std::uint32_t> rayOrder(const Receivers& receivers, const layout::Light& light,
+                                    std::span<const std::uint8_t> reached) {
+  std::vector<std::uint32_t> order = indicesOf(receivers.size(), reached);
   parallelBlocks(order.size(), kBlockRays, [&](std::size_t begin, std::size_t end) {
     Bounds bounds;
-    for (std::size_t slot = begin; slot < end; ++slot) bounds.add(tree.position(slot));
+    for (std::size_t k = begin; k < end; ++k) bounds.add(receivers.position(order[k]));
     const LightPlane plane(light, bounds.centre());
     std::vector<Crossing> rays(end - begin);
-    for (std::size_t slot = begin; slot < end; ++slot)
-      rays[slot - begin] = plane.cross(tree.position(slot), static_cast<std::uint32_t>(slot));
+    for (std::size_t k = begin; k < end; ++k) rays[k - begin] = plane.cross(receivers.position(order[k]), order[k]);
     Crossing* first = rays.data();
     Crossing* last = first + rays.size();
     splitEvenly<&Crossing::u>(first, last, kStripRays);

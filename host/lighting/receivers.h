@@ -4,6 +4,7 @@
 #include <span>
 
 #include "host/core/vec.h"
+#include "host/octree/octree.h"
 
 namespace mote {
 
@@ -18,7 +19,14 @@ struct Receivers {
 
   std::size_t size() const { return x.size(); }
   vec3 position(std::size_t k) const { return {x[k], y[k], z[k]}; }
+  Bounds bounds() const;  ///< of the points; parallel
   std::uint32_t selfOf(std::size_t k) const { return self.empty() ? static_cast<std::uint32_t>(k) : self[k]; }
 };
+
+/// Every slot of a tree, each leaving itself out.
+inline Receivers slotsOf(const Octree& tree) {
+  const std::size_t count = tree.particleCount();
+  return {std::span(tree.x).first(count), std::span(tree.y).first(count), std::span(tree.z).first(count), {}};
+}
 
 }  // namespace mote

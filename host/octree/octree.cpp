@@ -46,19 +46,21 @@ std::vector<CodedParticle> mortonOrder(std::span<const vec3> position) {
   return order;
 }
 
-void gatherSlots(Octree& tree, const std::vector<CodedParticle>& order, std::span<const vec3> position,
-                 std::span<const float> radius, std::span<const float> peak) {
+void gatherSlots(Octree& tree, const std::vector<CodedParticle>& order, const OctreeInput& input) {
   const std::size_t count = order.size(), padded = count + kSlotPadding;
   tree.source.resize(count);
   for (auto* array : {&tree.x, &tree.y, &tree.z}) array->resize(padded, kFarAway);
   for (auto* array : {&tree.radius, &tree.peak}) array->resize(padded, 0.0f);
+  if (!input.peakGreen.empty())
+    for (auto* array : {&tree.peakGreen, &tree.peakBlue}) array->resize(padded, 0.0f);
   parallelBlocks(count, kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t slot = begin; slot < end; ++slot) {
       const std::uint32_t i = order[slot].index;
       tree.source[slot] = i;
-      tree.x[slot] = position[i].x, tree.y[slot] = position[i].y, tree.z[slot] = position[i].z;
-      tree.radius[slot] = radius[i];
-      tree.peak[slot] = peak[i];
+      tree.x[slot] = input.position[i].x, tree.y[slot] = input.position[i].y, tree.z[slot] = input.position[i].z;
+      tree.radius[slot] = input.radius[i];
+      tree.peak[slot] = input.peak[i];
+      if (!input.peakGreen.empty()) tree.peakGreen[slot] = input.peakGreen[i], tree.peakBlue[slot] = input.peakBlue[i];
     }
   });
 }
@@ -174,15 +176,23 @@ Bounds Octree::bounds() const { return nodeCount() == 0 ? Bounds{} : Bounds{node
 
 Octree buildOctree(std::span<const vec3> position, std::span<const float> radius, std::span<const float> peak,
                    std::uint32_t particlesPerCell) {
-  MOTE_CHECK(position.size(), ==, radius.size());
-  MOTE_CHECK(position.size(), ==, peak.size());
+  return buildOctree({.position = position, .radius = radius, .peak = peak, .peakGreen = {}, .peakBlue = {}},
+                     particlesPerCell);
+}
+
+Octree buildOctree(const OctreeInput& input, std::uint32_t particlesPerCell) {
+  const std::span<const vec3> position = input.position;
+  MOTE_CHECK(position.size(), ==, input.radius.size());
+  MOTE_CHECK(position.size(), ==, input.peak.size());
+  MOTE_CHECK(input.peakGreen.size(), ==, input.peakBlue.size());
+  if (!input.peakGreen.empty()) MOTE_CHECK(position.size(), ==, input.peakGreen.size());
   MOTE_CHECK(particlesPerCell, >=, 1u);
   if (position.size() > 0xfffffffeull)
     throw InputError(
         fmt::format("{} particles: Mote numbers particles with 32 bits, so at most 4294967294", position.size()));
   Octree tree;
   const std::vector<CodedParticle> order = mortonOrder(position);
-  gatherSlots(tree, order, position, radius, peak);
+  gatherSlots(tree, order, input);
   tree.leastRadius = leastPositive(tree.radius);
   if (!order.empty()) TreeBuilder(tree, order, particlesPerCell).build(0, order.size(), tree.nodes);
   tree.nodes.push_back({vec3(std::numeric_limits<float>::infinity()), static_cast<layout::uint>(order.size()),

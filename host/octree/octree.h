@@ -28,13 +28,23 @@ struct Octree {
   std::vector<float> x, y, z;         ///< centres in slot order [scene units]; padded
   std::vector<float> radius;          ///< support radii in slot order; padded
   std::vector<float> peak;            ///< optical depth through the centre in slot order; padded
+  std::vector<float> peakGreen, peakBlue;  ///< … of the other colours, where they differ (peak is red then); else empty
   std::vector<std::uint32_t> source;  ///< slot → index in the input; not padded
   float leastRadius = 0;              ///< smallest support radius above 0; 0 without particles
 
+  /// 1: one sum serves all colours; 3: each has its own.
+  std::size_t channels() const { return peakGreen.empty() ? 1 : 3; }
   std::size_t particleCount() const { return source.size(); }
   std::size_t nodeCount() const { return nodes.empty() ? 0 : nodes.size() - 1; }
   vec3 position(std::size_t slot) const { return {x[slot], y[slot], z[slot]}; }
   Bounds bounds() const;  ///< of all supports
+};
+
+/// What an octree is made of, in any order; arrays of one length.
+struct OctreeInput {
+  std::span<const vec3> position;                     ///< finite
+  std::span<const float> radius;                      ///< finite, ≥ 0
+  std::span<const float> peak, peakGreen, peakBlue;   ///< finite, ≥ 0; green and blue both empty or both given
 };
 
 /// Builds the tree in parallel; the result does not depend on the number of threads.
@@ -42,6 +52,7 @@ struct Octree {
 /// Up to 2³² − 2 particles. About 0.1 s per million on two cores; 24 bytes a particle and 32 bytes a node.
 Octree buildOctree(std::span<const vec3> position, std::span<const float> radius, std::span<const float> peak,
                    std::uint32_t particlesPerCell = kDefaultParticlesPerCell);
+Octree buildOctree(const OctreeInput& input, std::uint32_t particlesPerCell = kDefaultParticlesPerCell);
 
 /// Checks every promise of the layout: order, skip links, ranges, conservative and nested boxes, each particle exactly
 /// once, leaf sizes. Returns the first broken promise as a sentence, or "" if all hold. Cost O(particles · depth).

@@ -38,7 +38,7 @@ inline std::vector<double> oracleOpticalDepths(const Octree& tree, const layout:
     const dvec3 origin(tree.position(i));
     dvec3 direction = -dvec3(light.direction);
     double length = INFINITY;
-    if (light.type == layout::kLightPoint) {
+    if (light.type != layout::kLightDirectional) {
       direction = dvec3(light.position) - origin;
       length = glm::length(direction);
       if (length == 0) continue;  // nothing lies between a light and a particle at the same place

@@ -11,7 +11,9 @@ inline layout::Light pointLight(const glm::vec3& position) {
           .decay = 2,
           .power = glm::vec3(1),
           .shadowDensity = 1,
-          .castsShadows = 1};
+          .castsShadows = 1,
+          .cosInner = 1,
+          .cosOuter = -1};
 }
 
 /// `direction` of travel, of any length.
@@ -22,7 +24,9 @@ inline layout::Light directionalLight(const glm::vec3& direction) {
           .decay = 0,
           .power = glm::vec3(1),
           .shadowDensity = 1,
-          .castsShadows = 1};
+          .castsShadows = 1,
+          .cosInner = 1,
+          .cosOuter = -1};
 }
 
 }  // namespace mote

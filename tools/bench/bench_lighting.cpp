@@ -50,7 +50,9 @@ layout::Light pointLight() {
           .decay = 2,
           .power = vec3(60),
           .shadowDensity = 1,
-          .castsShadows = 1};
+          .castsShadows = 1,
+          .cosInner = 1,
+          .cosOuter = -1};
 }
 
 /// The build, with the sort of as many numbers beside it: a yardstick of the machine's speed at that moment.

@@ -1,4 +1,4 @@
-// Optical depth from every particle toward one light: the walk of host/lighting over the same flattened tree.
+// Optical depth from receivers (particles, points of surfaces) toward one light: the walk of host/lighting over the same flattened tree.
 //
 // A subgroup walks the tree as one: a node is entered if any of its rays touches the box, so node and particle addresses
 // are the same in every lane. On hardware such loads are one transaction a subgroup and there is no divergence; on
@@ -19,6 +19,8 @@ layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const uint kRays = 2;
 layout(constant_id = 2) const uint kFalloff = 0;
 layout(constant_id = 3) const uint kEndpoint = 0;
+layout(constant_id = 4) const uint kChannels = 1;
+layout(constant_id = 5) const bool kOwnSlots = true;  // receiver k is slot k
 
 #include "falloff.glsl"
 
@@ -42,13 +44,14 @@ void main() {
   dvec3 exactDirection[kRays];
   double exactLength[kRays];
 #endif
-  float len[kRays], depth[kRays];
-  uint self[kRays];
+  float len[kRays], depth[kRays], depthGreen[kRays], depthBlue[kRays];
+  uint receiver[kRays], self[kRays];
   for (uint k = 0; k < kRays; ++k) {
     const uint ray = min(base + k, params.rayCount - 1);
-    self[k] = params.order.at[params.firstRay + ray];
-    origin[k] = params.particles.at[self[k]].xyz;
-    depth[k] = 0.0;
+    receiver[k] = params.order.at[params.firstRay + ray];
+    self[k] = kOwnSlots ? receiver[k] : params.selves.at[receiver[k]];
+    origin[k] = params.origins.at[receiver[k]].xyz;
+    depth[k] = depthGreen[k] = depthBlue[k] = 0.0;
     if (params.lightType == kLightDirectional) {
       direction[k] = -params.lightDirection;
       len[k] = kEndless;
@@ -114,6 +117,8 @@ void main() {
       const vec4 particle = params.particles.at[slot];
       const vec3 centre = particle.xyz - base;
       const float peak = params.peaks.at[slot];
+      float peakGreen = 0.0, peakBlue = 0.0;
+      if (kChannels == 3) peakGreen = params.peaksGreen.at[slot], peakBlue = params.peaksBlue.at[slot];
       const float inverseSquare = 1.0 / (particle.w * particle.w);
       for (uint k = 0; k < kRays; ++k) {
         const vec3 d = centre - near[k];
@@ -128,16 +133,27 @@ void main() {
           const float halfChord = particle.w * sqrt(max(1.0 - q, 0.0));
           share = falloff(q, kFalloff) * cap(before[k] + t, halfChord) * cap(after[k] - t, halfChord);
         }
-        depth[k] += slot == self[k] ? 0.0 : peak * share;
+        share = slot == self[k] ? 0.0 : share;
+        depth[k] += peak * share;
+        if (kChannels == 3) depthGreen[k] += peakGreen * share, depthBlue[k] += peakBlue * share;
       }
     }
     bool done = true;
-    for (uint k = 0; k < kRays; ++k) done = done && depth[k] > params.opticalDepthLimit;
+    for (uint k = 0; k < kRays; ++k) {
+      const float least = kChannels == 3 ? min(depth[k], min(depthGreen[k], depthBlue[k])) : depth[k];
+      done = done && least > params.opticalDepthLimit;
+    }
     if (subgroupAll(done)) break;
   }
 
-  for (uint k = 0; k < kRays; ++k)
-    if (base + k < params.rayCount) params.opticalDepths.at[self[k]] = len[k] > 0.0 ? depth[k] : 0.0;
+  for (uint k = 0; k < kRays; ++k) {
+    if (base + k >= params.rayCount) continue;
+    params.opticalDepths.at[receiver[k]] = len[k] > 0.0 ? depth[k] : 0.0;
+    if (kChannels == 3) {
+      params.opticalDepths.at[params.receiverCount + receiver[k]] = len[k] > 0.0 ? depthGreen[k] : 0.0;
+      params.opticalDepths.at[2 * params.receiverCount + receiver[k]] = len[k] > 0.0 ? depthBlue[k] : 0.0;
+    }
+  }
 }
 
 #endif
