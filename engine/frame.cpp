@@ -7,8 +7,11 @@
 #include "host/core/parallel.h"
 #include "host/core/sha256.h"
 #include "host/core/timer.h"
+#include "host/lighting/auto_subsample.h"
+#include "host/lighting/irradiance.h"
 #include "host/lighting/medium.h"
 #include "host/particles/particle_loader.h"
+#include "host/scene/camera_path.h"
 #include "host/scene/fitting.h"
 #include "host/splat/splat.h"
 
@@ -16,14 +19,18 @@ namespace mote {
 namespace {
 
 layout::Light toLight(const LightSource& source) {
-  const bool point = source.type == LightType::Point;
+  const bool directional = source.type == LightType::Directional;
   return {.position = source.position,
-          .type = point ? layout::kLightPoint : layout::kLightDirectional,
+          .type = directional                      ? layout::kLightDirectional
+                  : source.type == LightType::Spot ? layout::kLightSpot
+                                                   : layout::kLightPoint,
           .direction = source.direction,
-          .decay = point ? source.decay : 0.0f,
+          .decay = directional ? 0.0f : source.decay,
           .power = source.strength * source.color,
           .shadowDensity = source.shadowDensity,
-          .castsShadows = source.castsShadows ? 1u : 0u};
+          .castsShadows = source.castsShadows ? 1u : 0u,
+          .cosInner = static_cast<float>(std::cos(source.innerAngle * kPi / 180)),
+          .cosOuter = static_cast<float>(std::cos(source.outerAngle * kPi / 180))};
 }
 
 std::vector<FrameInput> hashInputs(const std::vector<std::string>& files) {
@@ -32,40 +39,100 @@ std::vector<FrameInput> hashInputs(const std::vector<std::string>& files) {
   return inputs;
 }
 
-/// The scale on Density that gives lines through the particles of `tree`, built with scale 1, the mean optical depth
-/// that the scene asks for.
-double calibratedScale(const Octree& tree, double wanted, layout::uint falloff, const std::string& place) {
-  const double mean = meanLineOpticalDepth(tree, falloff);
+/// The arrays that the density tree is made of, and their owner.
+struct DensityArrays {
+  const Frame& frame;
+  std::vector<float> channels[3];  ///< with different extinction in each colour; else empty, and frame.peak serves
+
+  explicit DensityArrays(const Frame& from) : frame(from) {
+    const std::vector<vec3>& factor = from.extinction.factor;
+    if (factor.empty()) return;
+    for (int c = 0; c < 3; ++c) {
+      channels[c].resize(factor.size());
+      for (std::size_t i = 0; i < factor.size(); ++i) channels[c][i] = from.peak[i] * factor[i][c];
+    }
+  }
+  DensityInput input() const {
+    const ParticleSet& particles = frame.particles;
+    if (channels[0].empty()) return {particles.position, particles.radius, frame.peak, {}, {}, particles.id};
+    return {particles.position, particles.radius, channels[0], channels[1], channels[2], particles.id};
+  }
+};
+
+DensityRules densityRules(const Scene& scene) {
+  const LightingSettings& lighting = scene.lighting;
+  return {.crossSection = scene.medium.densityMode == DensityMode::CrossSection,
+          .radiusScale = lighting.radiusScale,
+          .fraction = lighting.subsample,
+          .seed = lighting.subsampleSeed,
+          .compensate = lighting.compensate,
+          .particlesPerCell = lighting.particlesPerCell > 0 ? lighting.particlesPerCell : kDefaultParticlesPerCell};
+}
+
+/// The scale on Density that gives lines through the particles the mean optical depth that the scene asks for: of all
+/// particles at their own size, as they are drawn, whatever share of them casts shadows.
+double calibratedScale(const Frame& frame, double wanted, const std::string& place) {
+  const DensityArrays arrays(frame);
+  const DensityTree all(arrays.input(), {});
+  const vec3& uniform = frame.rules.extinction;
+  const double mean = meanLineOpticalDepth(all.tree(), frame.rules.falloff) * (uniform.x + uniform.y + uniform.z) / 3;
   if (!(mean > 0))
     throw InputError(place, "/medium/optical_depth", "particles with some density to calibrate",
-                     "a mean optical depth of 0", "is the channel Density zero everywhere?");
+                     "a mean optical depth of 0", "is the channel Density, or medium.extinction, zero everywhere?");
   return wanted / mean;
 }
 
-/// Optical depths are proportional to the density, so a tree is built once and then scaled.
-void scaleDensity(Octree& tree, double scale) {
-  parallelBlocks(tree.peak.size(), 1 << 16, [&](std::size_t begin, std::size_t end) {
+void scale(std::vector<float>& peaks, double factor) {
+  parallelBlocks(peaks.size(), 1 << 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
-      tree.peak[i] = static_cast<float>(std::min(tree.peak[i] * scale, double(std::numeric_limits<float>::max())));
+      peaks[i] = static_cast<float>(std::min(peaks[i] * factor, double(std::numeric_limits<float>::max())));
   });
 }
 
-/// Camera, lights and density scale that the scene leaves open, from its first frame.
-void settle(Scene& scene, const ParticleSet& particles, const Octree& tree, layout::uint falloff) {
-  fitDefaults(scene, particles.supportBounds());
-  if (!scene.medium.opticalDepth) return;
-  const double scale = calibratedScale(tree, *scene.medium.opticalDepth, falloff, scene.path);
-  logVerbose(fmt::format("optical_depth {} is density_scale {}", *scene.medium.opticalDepth, scale));
-  scene.medium.densityScale = static_cast<float>(scale);
-  scene.medium.opticalDepth.reset();
+/// Density scale and sub-sampling that the scene leaves open, from its first frame.
+void settleDensity(Scene& scene, Frame& frame) {
+  if (scene.medium.opticalDepth) {
+    const double density = calibratedScale(frame, *scene.medium.opticalDepth, scene.path);
+    logVerbose(fmt::format("optical_depth {} is density_scale {}", *scene.medium.opticalDepth, density));
+    scene.medium.densityScale = static_cast<float>(density);
+    scene.medium.opticalDepth.reset();
+  }
+  scale(frame.peak, scene.medium.densityScale);
+  if (!scene.lighting.autoSubsample) return;
+  const DensityArrays arrays(frame);
+  const SubsampleChoice choice =
+      autoSubsample(arrays.input(), densityRules(scene), frame.lights, frame.rules, scene.lighting.error);
+  logVerbose(fmt::format("subsample \"auto\" is {:.4g}: mean |dT| {:.2g}, allowed {:.2g}", choice.fraction,
+                         choice.error, scene.lighting.error));
+  scene.lighting.subsample = choice.fraction;
+  scene.lighting.autoSubsample = false;
+  scene.lighting.subsampleError = choice.error;
 }
 
-Octree buildTree(const ParticleSet& particles, const Scene& scene, layout::uint falloff) {
-  const bool crossSection = scene.medium.densityMode == DensityMode::CrossSection;
-  const std::uint32_t cell = scene.lighting.particlesPerCell;
-  return buildOctree(particles.position, particles.radius,
-                     peakOpticalDepths(particles.density, particles.radius, falloff, crossSection, 1.0),
-                     cell > 0 ? cell : kDefaultParticlesPerCell);
+void prepareMedium(const Scene& scene, Frame& frame) {
+  const ParticleSet& particles = frame.particles;
+  const Medium& medium = scene.medium;
+  frame.rules.falloff = falloffCode(medium.falloff);
+  frame.rules.endpoint = endpointCode(scene.lighting.endpoint);
+  frame.rules.cutoff = scene.lighting.cutoff;
+  frame.extinction =
+      colorExtinction(particles.color, particles.uniformColor, particles.absorption, medium.albedo, medium.extinction);
+  if (frame.extinction.factor.empty()) frame.rules.extinction = frame.extinction.uniform;
+  frame.peak = peakOpticalDepths(particles.density, particles.radius, frame.rules.falloff,
+                                 medium.densityMode == DensityMode::CrossSection, 1.0);
+}
+
+Viewer viewerOf(const layout::SplatCamera& camera) {
+  return {.eye = camera.position, .parallel = camera.orthographic != 0, .toCamera = -camera.forward};
+}
+
+PhaseFunction phaseOf(const Phase& phase) {
+  switch (phase.type) {
+    case PhaseType::HenyeyGreenstein: return {PhaseKind::HenyeyGreenstein, phase.g};
+    case PhaseType::Rayleigh: return {PhaseKind::Rayleigh, 0};
+    case PhaseType::Isotropic: break;
+  }
+  return {};
 }
 
 }  // namespace
@@ -91,20 +158,24 @@ Frame prepareFrame(Scene& scene, int number, FrameStats& stats) {
   stats.inputs = hashInputs(files);
   stats.seconds["load"] = timer.lap();
 
-  frame.rules = {falloffCode(scene.medium.falloff), endpointCode(scene.lighting.endpoint), scene.lighting.cutoff};
-  frame.tree = buildTree(frame.particles, scene, frame.rules.falloff);
-  settle(scene, frame.particles, frame.tree, frame.rules.falloff);
-  scaleDensity(frame.tree, scene.medium.densityScale);
-  frame.view =
-      makeSplatCamera(scene.camera.position, scene.camera.target, scene.camera.up, scene.camera.fov, scene.camera.near,
-                      scene.camera.far, scene.output.size.x, scene.output.size.y, frame.rules.falloff);
+  fitDefaults(scene, frame.particles.supportBounds());
   for (const LightSource& light : scene.lights) {
     frame.lights.push_back(toLight(light));
     frame.lightNames.push_back(light.name);
   }
+  prepareMedium(scene, frame);
+  settleDensity(scene, frame);
+  frame.density = DensityTree(DensityArrays(frame).input(), densityRules(scene));
+  const Camera camera = cameraAt(scene.camera, number);
+  frame.view = makeSplatCamera(camera.position, camera.target, camera.up, camera.fov, camera.near, camera.far,
+                               scene.output.size.x, scene.output.size.y, frame.rules.falloff);
+  frame.scattering = {phaseOf(scene.medium.phase), viewerOf(frame.view)};
+
   stats.densityScale = scene.medium.densityScale;
   stats.particles = frame.particles.size();
-  stats.inOctree = frame.tree.particleCount();
+  stats.inOctree = frame.density.tree().particleCount();
+  stats.subsample = scene.lighting.subsample;
+  stats.subsampleError = scene.lighting.subsampleError;
   stats.lights = frame.lights.size();
   stats.radius = radiusRange(frame.particles);
   stats.seconds["octree"] = timer.lap();
@@ -112,37 +183,67 @@ Frame prepareFrame(Scene& scene, int number, FrameStats& stats) {
 }
 
 OpticalDepthSource hostOpticalDepths(const Frame& frame) {
-  return [&frame](const layout::Light& light, const RaysDone& done) {
-    return opticalDepths(frame.tree, light, frame.rules, done);
+  return [&frame](const Receivers& receivers, const layout::Light& light, std::span<const std::uint8_t> reached,
+                  const RaysDone& done) {
+    return opticalDepths(frame.density.tree(), receivers, light, frame.rules, reached, done);
   };
 }
 
+namespace {
+
+/// Support radii in the order of the receivers.
+std::vector<float> receiverRadii(const Frame& frame) {
+  const std::vector<std::uint32_t>& source = frame.density.source();
+  std::vector<float> radii(source.size());
+  for (std::size_t k = 0; k < radii.size(); ++k) radii[k] = frame.particles.radius[source[k]];
+  return radii;
+}
+
+/// Which receivers a light can reach; empty: all.
+std::vector<std::uint8_t> reachedBy(const layout::Light& light, const Receivers& receivers) {
+  if (light.type != layout::kLightSpot) return {};
+  std::vector<std::uint8_t> reached(receivers.size());
+  parallelBlocks(reached.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) reached[k] = reaches(light, receivers.position(k)) ? 1 : 0;
+  });
+  return reached;
+}
+
+}  // namespace
+
 LitParticles lightParticles(const Frame& frame, const OpticalDepthSource& source, bool keepTransmittance) {
-  const std::size_t count = frame.tree.particleCount();
+  const Receivers receivers = frame.density.receivers();
+  const std::size_t count = receivers.size();
+  const std::vector<float> radii = receiverRadii(frame);
   LitParticles lit;
   lit.radiance.assign(count, vec3(0));
   Progress progress("lighting", static_cast<double>(count) * static_cast<double>(frame.lights.size()));
   for (const layout::Light& light : frame.lights) {
+    const std::vector<std::uint8_t> reached = reachedBy(light, receivers);
     const std::vector<float> depths =
-        source(light, [&](std::size_t rays) { progress.advance(static_cast<double>(rays)); });
-    std::vector<float> transmittance = transmittances(depths, light);
-    addInScattering(frame.tree, light, transmittance, lit.radiance);
+        source(receivers, light, reached, [&](std::size_t rays) { progress.advance(static_cast<double>(rays)); });
+    std::vector<float> transmittance = transmittances(depths, count, light, frame.rules.extinction);
+    addInScattering(receivers, radii, light, transmittance, {}, frame.scattering, lit.radiance);
     if (keepTransmittance) lit.transmittance.push_back(std::move(transmittance));
   }
   return lit;
 }
 
 std::vector<layout::SplatParticle> splatParticles(const Frame& frame, const Medium& medium, const LitParticles& lit) {
-  const Octree& tree = frame.tree;
-  const std::vector<vec3>& color = frame.particles.color;
-  std::vector<layout::SplatParticle> splats(tree.particleCount());
+  const Receivers receivers = frame.density.receivers();
+  const std::vector<std::uint32_t>& source = frame.density.source();
+  const ParticleSet& particles = frame.particles;
+  std::vector<layout::SplatParticle> splats(receivers.size());
   parallelBlocks(splats.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t slot = begin; slot < end; ++slot) {
-      const vec3 own = color.empty() ? frame.particles.uniformColor : color[tree.source[slot]];
-      splats[slot] = {.position = tree.position(slot),
-                      .radius = tree.radius[slot],
-                      .radiance = medium.albedo * own * lit.radiance[slot],
-                      .peak = tree.peak[slot]};
+    for (std::size_t k = begin; k < end; ++k) {
+      const std::size_t i = source[k];
+      const vec3 own = particles.color.empty() ? particles.uniformColor : particles.color[i];
+      const vec3 albedo = singleScatteringAlbedo(medium.albedo * own,
+                                                 particles.absorption.empty() ? nullptr : &particles.absorption[i]);
+      splats[k] = {.position = receivers.position(k),
+                   .radius = particles.radius[i],
+                   .radiance = albedo * lit.radiance[k],
+                   .peak = frame.peak[i]};
     }
   });
   return splats;

@@ -5,8 +5,9 @@
 #include <vector>
 
 #include "engine/stats.h"
+#include "host/lighting/density_tree.h"
 #include "host/lighting/lighting.h"
-#include "host/octree/octree.h"
+#include "host/lighting/medium.h"
 #include "host/particles/particle_set.h"
 #include "host/scene/scene.h"
 #include "shaders/glsl/layout/splat.h"
@@ -15,12 +16,15 @@ namespace mote {
 
 struct Frame {
   int number = 1;
-  ParticleSet particles;  ///< in input order; tree.source maps slots to it
-  Octree tree;
+  ParticleSet particles;       ///< in input order; density.source() maps receivers to it
+  std::vector<float> peak;     ///< grey optical depth through each particle's centre at its own radius, input order
+  ColorExtinction extinction;  ///< what it is in each colour
+  DensityTree density;         ///< the particles that cast shadows, and all of them as receivers in Morton order
   std::vector<layout::Light> lights;
   std::vector<std::string> lightNames;
+  LightingOptions rules;  ///< falloff, endpoint, cutoff, extinction where it is uniform
+  Scattering scattering;
   layout::SplatCamera view;  ///< the camera as the splats take it
-  LightingOptions rules;     ///< falloff, endpoint, cutoff
 };
 
 /// Loads and builds; fills `stats` (counts, radius, density scale, inputs, seconds of load and octree).
@@ -29,20 +33,21 @@ struct Frame {
 /// Throws InputError as readers and loaders do.
 Frame prepareFrame(Scene& scene, int number, FrameStats& stats);
 
-/// What the lights do to the particles, in slot order.
+/// What the lights do to the particles, in the order of the receivers.
 struct LitParticles {
   std::vector<vec3> radiance;                     ///< in-scattered radiance Σ p·E·T [W/(m² sr)], before the albedo
-  std::vector<std::vector<float>> transmittance;  ///< one array a light; empty unless asked for
+  std::vector<std::vector<float>> transmittance;  ///< one a light, [channel][receiver]; empty unless asked for
 };
 
-/// A function that gives the optical depths of every slot toward a light: on the host or on a device.
-using OpticalDepthSource = std::function<std::vector<float>(const layout::Light&, const RaysDone&)>;
+/// A function that gives optical depths toward a light, as mote::opticalDepths: on the host or on a device.
+using OpticalDepthSource = std::function<std::vector<float>(const Receivers&, const layout::Light&,
+                                                            std::span<const std::uint8_t> reached, const RaysDone&)>;
 OpticalDepthSource hostOpticalDepths(const Frame& frame);
 
 /// Lights every particle with every light of the frame; the cost is linear in lights. Shows progress.
 LitParticles lightParticles(const Frame& frame, const OpticalDepthSource& source, bool keepTransmittance);
 
-/// What the splat stage draws, in slot order: radiance is albedo · Color · in-scattered radiance.
+/// What the splat stage draws, in the order of the receivers: radiance is albedo · Color · in-scattered radiance.
 std::vector<layout::SplatParticle> splatParticles(const Frame& frame, const Medium& medium, const LitParticles& lit);
 
 /// Shader codes of the scene's choices.

@@ -61,12 +61,11 @@ LitParticles Renderer::light(const Frame& frame, bool keepTransmittance, FrameSt
   LitParticles lit;
   if (backends_.gpuLighting) {
     LightPass pass(gpu_->device(), frame.rules.falloff, frame.rules.endpoint);
-    pass.setTree(frame.tree);
+    pass.setTree(frame.density.tree());
     lit = lightParticles(
         frame,
-        [&](const layout::Light& light, const RaysDone& done) {
-          return pass.opticalDepths(light, frame.rules.cutoff, done);
-        },
+        [&](const Receivers& receivers, const layout::Light& light, std::span<const std::uint8_t> reached,
+            const RaysDone& done) { return pass.opticalDepths(receivers, light, frame.rules, reached, done); },
         keepTransmittance);
     stats.deviceSeconds["lighting"] += pass.deviceSeconds();
     stats.deviceBytes = std::max(stats.deviceBytes, pass.deviceBytes());

@@ -18,6 +18,7 @@ Json reproducible(const FrameStats& frame) {
           {"in_octree", frame.inOctree},
           {"lights", frame.lights},
           {"density_scale", frame.densityScale},
+          {"subsample", {{"fraction", frame.subsample}, {"error", frame.subsampleError}}},
           {"radius", {{"min", frame.radius.min}, {"mean", frame.radius.mean}, {"max", frame.radius.max}}},
           {"inputs", std::move(inputs)},
           {"warnings", frame.warnings}};

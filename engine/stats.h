@@ -20,6 +20,8 @@ struct FrameStats {
   std::map<std::string, double> deviceSeconds;  ///< the GPU's own clock (timestamps): lighting, sort, splat
   std::uint64_t deviceBytes = 0;                ///< most device memory held at once by one stage
   double densityScale = 1;
+  double subsample = 1;       ///< share of the particles in the octree …
+  double subsampleError = 0;  ///< … and its mean |ΔT| where "auto" measured it
   RadiusRange radius;
   std::vector<FrameInput> inputs;
   std::vector<std::string> warnings;

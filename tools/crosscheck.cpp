@@ -53,7 +53,7 @@ LightDifference compareLight(const Frame& frame, std::size_t light, const Side& 
     double delta = std::abs(double(a[slot]) - double(b[slot]));
     if (!std::isfinite(delta)) delta = std::numeric_limits<double>::infinity();  // not a number on either side
     difference.mean += delta / static_cast<double>(a.size());
-    if (delta > difference.worst) difference.worst = delta, difference.particle = frame.tree.source[slot];
+    if (delta > difference.worst) difference.worst = delta, difference.particle = frame.density.source()[slot % frame.density.source().size()];
   }
   return difference;
 }

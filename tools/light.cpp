@@ -19,25 +19,35 @@ struct LightOptions {
   bool frameGiven = false;
 };
 
-/// From slot order back to the order of the input.
-template <class T>
-std::vector<T> inInputOrder(const Octree& tree, const std::vector<T>& slots) {
-  std::vector<T> result(slots.size());
-  parallelBlocks(slots.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t slot = begin; slot < end; ++slot) result[tree.source[slot]] = slots[slot];
+/// From the receivers' order back to that of the input.
+template <class T, class Get>
+std::vector<T> inInputOrder(const Frame& frame, const Get& get) {
+  const std::vector<std::uint32_t>& source = frame.density.source();
+  std::vector<T> result(source.size());
+  parallelBlocks(source.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) result[source[k]] = get(k);
   });
   return result;
 }
 
 void writeLit(const std::string& path, const Frame& frame, const LitParticles& lit) {
-  const std::vector<vec3> lighting = inInputOrder(frame.tree, lit.radiance);
-  std::vector<std::vector<float>> transmittance;
-  for (const std::vector<float>& slots : lit.transmittance) transmittance.push_back(inInputOrder(frame.tree, slots));
-
+  const std::size_t count = lit.radiance.size();
+  const std::vector<vec3> lighting = inInputOrder<vec3>(frame, [&](std::size_t k) { return lit.radiance[k]; });
+  std::vector<std::vector<float>> grey(lit.transmittance.size());  // one of the two for each light
+  std::vector<std::vector<vec3>> colored(lit.transmittance.size());
   std::vector<PrtColumn> columns = columnsOf(frame.particles);
   columns.push_back(PrtColumn::of("Lighting", std::span<const vec3>(lighting)));
-  for (std::size_t l = 0; l < transmittance.size(); ++l)
-    columns.push_back(PrtColumn::of("Transmittance_" + frame.lightNames[l], std::span<const float>(transmittance[l])));
+  for (std::size_t l = 0; l < lit.transmittance.size(); ++l) {
+    const std::vector<float>& t = lit.transmittance[l];
+    const std::string name = "Transmittance_" + frame.lightNames[l];
+    if (t.size() == count) {
+      grey[l] = inInputOrder<float>(frame, [&](std::size_t k) { return t[k]; });
+      columns.push_back(PrtColumn::of(name, std::span<const float>(grey[l])));
+    } else {
+      colored[l] = inInputOrder<vec3>(frame, [&](std::size_t k) { return vec3(t[k], t[count + k], t[2 * count + k]); });
+      columns.push_back(PrtColumn::of(name, std::span<const vec3>(colored[l])));
+    }
+  }
   writePrt(path, columns);
 }
 

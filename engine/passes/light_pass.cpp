@@ -105,9 +105,9 @@ std::vector<float> LightPass::opticalDepths(const Receivers& receivers, const la
   const Buffer order = device_.createBufferWith<std::uint32_t>(rays);
   // Receivers without a ray keep the zeros.
   const Buffer depths = device_.createBufferWith<float>(std::vector<float>(numbers, 0.0f));
-  deviceBytes_ = std::max(deviceBytes_, nodes_.size() + particles_.size() + peaks_.size() + peaksGreen_.size() +
-                                            peaksBlue_.size() + origins.size() + selves.size() + order.size() +
-                                            depths.size());
+  deviceBytes_ =
+      std::max(deviceBytes_, nodes_.size() + particles_.size() + peaks_.size() + peaksGreen_.size() +
+                                 peaksBlue_.size() + origins.size() + selves.size() + order.size() + depths.size());
   layout::LightParams params{};
   params.nodes = nodes_.address();
   params.particles = particles_.address();

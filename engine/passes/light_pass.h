@@ -45,7 +45,7 @@ class LightPass {
   layout::uint falloff_, endpoint_;
   std::uint32_t raysPerGroup_;
   const Octree* tree_ = nullptr;
-  bool exact_ = false;                               // the tree spans so much that rays are rebased in double
+  bool exact_ = false;                                // the tree spans so much that rays are rebased in double
   std::optional<ComputePipeline> ownSlots_, others_;  // for receivers that are the tree's slots, and for any
   Buffer nodes_, particles_, peaks_, peaksGreen_, peaksBlue_;
   double deviceSeconds_ = 0;

@@ -11,7 +11,8 @@ namespace mote {
 struct WalkOptions {
   layout::uint falloff = layout::kFalloffSmooth;
   layout::uint endpoint = layout::kEndpointSoft;
-  float opticalDepthLimit = std::numeric_limits<float>::infinity();  ///< stop once every ray is beyond, in every channel
+  float opticalDepthLimit =
+      std::numeric_limits<float>::infinity();  ///< stop once every ray is beyond, in every channel
 };
 
 /// Adds every particle's share to packet.opticalDepth, channel by channel of the tree.

@@ -125,7 +125,8 @@ std::vector<float> lineOpticalDepths(const Octree& tree, std::span<const vec3> p
       // From a start outside everything, the ray is the whole line.
       Packet packet = makeLinePacket(points[i] - away * directions[i], directions[i], shape);
       walkSimd(tree, {falloff, layout::kEndpointSoft, std::numeric_limits<float>::infinity()}, packet);
-      depths[i] = packet.opticalDepth[0][0];
+      const auto& sums = packet.opticalDepth;
+      depths[i] = tree.channels() == 1 ? sums[0][0] : (sums[0][0] + sums[1][0] + sums[2][0]) / 3;
     }
   });
   return depths;

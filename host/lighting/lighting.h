@@ -58,7 +58,8 @@ std::vector<float> transmittances(const std::vector<float>& opticalDepths, std::
 /// Grey, extinction 1.
 std::vector<float> transmittances(const std::vector<float>& opticalDepths, const layout::Light& light);
 
-/// Optical depth of whole straight lines (both directions, nothing left out) through `points` along unit `directions`.
+/// Optical depth of whole straight lines (both directions, nothing left out) through `points` along unit `directions`;
+/// the mean of the channels where the tree has three.
 std::vector<float> lineOpticalDepths(const Octree& tree, std::span<const vec3> points, std::span<const vec3> directions,
                                      layout::uint falloff);
 

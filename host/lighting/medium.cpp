@@ -1,5 +1,6 @@
 #include "host/lighting/medium.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "host/core/error.h"
@@ -25,6 +26,32 @@ std::vector<float> peakOpticalDepths(std::span<const float> density, std::span<c
     }
   });
   return peaks;
+}
+
+ColorExtinction colorExtinction(std::span<const vec3> color, const vec3& uniformColor, std::span<const vec3> absorption,
+                                const vec3& albedo, const vec3& extinction) {
+  ColorExtinction result{extinction, {}};
+  if (absorption.empty()) return result;
+  std::vector<vec3> factor(absorption.size());
+  parallelBlocks(factor.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      factor[i] = ((color.empty() ? uniformColor : color[i]) * albedo + absorption[i]) * extinction;
+  });
+  if (std::all_of(factor.begin(), factor.end(), [&](const vec3& f) { return f == factor.front(); }))
+    result.uniform = factor.front();
+  else
+    result.factor = std::move(factor);
+  return result;
+}
+
+vec3 singleScatteringAlbedo(const vec3& scattering, const vec3* absorption) {
+  if (!absorption) return scattering;
+  vec3 albedo(0);
+  for (int c = 0; c < 3; ++c) {
+    const float sum = scattering[c] + (*absorption)[c];
+    if (sum > 0) albedo[c] = scattering[c] / sum;
+  }
+  return albedo;
 }
 
 double meanLineOpticalDepth(const Octree& tree, layout::uint falloff, std::uint64_t seed) {

@@ -28,7 +28,7 @@ struct Rays {
 struct Packet {
   Rays rays;  ///< base 0: origins are the particles, before 0, after the length
   alignas(64) float directionX[kPacketRays], directionY[kPacketRays],
-      directionZ[kPacketRays];                  ///< unit, toward the light
+      directionZ[kPacketRays];                     ///< unit, toward the light
   alignas(64) std::uint32_t self[kPacketRays];     ///< slot that the ray leaves out, or kNoSlot
   alignas(64) float opticalDepth[3][kPacketRays];  ///< the sums so far, as many as the tree has channels; start at 0
   /// Directions and lengths before rounding, for rebase().

@@ -14,8 +14,9 @@ constexpr std::uint32_t kNoSlot = 0xffffffffu;
 /// Views of arrays that somebody else owns. Neighbours in the arrays should be neighbours in space (Morton order):
 /// packets are made of them.
 struct Receivers {
-  std::span<const float> x, y, z;       ///< where they are [scene units]; all of one length
-  std::span<const std::uint32_t> self;  ///< the tree's slot that each leaves out, or kNoSlot; empty: receiver k is slot k
+  std::span<const float> x, y, z;  ///< where they are [scene units]; all of one length
+  std::span<const std::uint32_t>
+      self;  ///< the tree's slot that each leaves out, or kNoSlot; empty: receiver k is slot k
 
   std::size_t size() const { return x.size(); }
   vec3 position(std::size_t k) const { return {x[k], y[k], z[k]}; }

@@ -28,7 +28,7 @@ struct CodedParticle {
   }
 };
 
-std::vector<CodedParticle> mortonOrder(std::span<const vec3> position) {
+std::vector<CodedParticle> codedOrder(std::span<const vec3> position) {
   Bounds bounds;
   std::vector<Bounds> parts((position.size() + kGrain - 1) / kGrain);
   parallelBlocks(position.size(), kGrain, [&](std::size_t begin, std::size_t end) {
@@ -172,6 +172,13 @@ class TreeBuilder {
 
 }  // namespace
 
+std::vector<std::uint32_t> mortonOrder(std::span<const vec3> position) {
+  const std::vector<CodedParticle> coded = codedOrder(position);
+  std::vector<std::uint32_t> order(coded.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = coded[i].index;
+  return order;
+}
+
 Bounds Octree::bounds() const { return nodeCount() == 0 ? Bounds{} : Bounds{nodes[0].lo, nodes[0].hi}; }
 
 Octree buildOctree(std::span<const vec3> position, std::span<const float> radius, std::span<const float> peak,
@@ -191,7 +198,7 @@ Octree buildOctree(const OctreeInput& input, std::uint32_t particlesPerCell) {
     throw InputError(
         fmt::format("{} particles: Mote numbers particles with 32 bits, so at most 4294967294", position.size()));
   Octree tree;
-  const std::vector<CodedParticle> order = mortonOrder(position);
+  const std::vector<CodedParticle> order = codedOrder(position);
   gatherSlots(tree, order, input);
   tree.leastRadius = leastPositive(tree.radius);
   if (!order.empty()) TreeBuilder(tree, order, particlesPerCell).build(0, order.size(), tree.nodes);

@@ -24,13 +24,13 @@ constexpr std::uint32_t kDefaultParticlesPerCell = 64;
 constexpr std::size_t kSlotPadding = 16;
 
 struct Octree {
-  std::vector<layout::Node> nodes;    ///< depth first; the last is the sentinel
-  std::vector<float> x, y, z;         ///< centres in slot order [scene units]; padded
-  std::vector<float> radius;          ///< support radii in slot order; padded
-  std::vector<float> peak;            ///< optical depth through the centre in slot order; padded
+  std::vector<layout::Node> nodes;         ///< depth first; the last is the sentinel
+  std::vector<float> x, y, z;              ///< centres in slot order [scene units]; padded
+  std::vector<float> radius;               ///< support radii in slot order; padded
+  std::vector<float> peak;                 ///< optical depth through the centre in slot order; padded
   std::vector<float> peakGreen, peakBlue;  ///< … of the other colours, where they differ (peak is red then); else empty
-  std::vector<std::uint32_t> source;  ///< slot → index in the input; not padded
-  float leastRadius = 0;              ///< smallest support radius above 0; 0 without particles
+  std::vector<std::uint32_t> source;       ///< slot → index in the input; not padded
+  float leastRadius = 0;                   ///< smallest support radius above 0; 0 without particles
 
   /// 1: one sum serves all colours; 3: each has its own.
   std::size_t channels() const { return peakGreen.empty() ? 1 : 3; }
@@ -42,9 +42,9 @@ struct Octree {
 
 /// What an octree is made of, in any order; arrays of one length.
 struct OctreeInput {
-  std::span<const vec3> position;                     ///< finite
-  std::span<const float> radius;                      ///< finite, ≥ 0
-  std::span<const float> peak, peakGreen, peakBlue;   ///< finite, ≥ 0; green and blue both empty or both given
+  std::span<const vec3> position;                    ///< finite
+  std::span<const float> radius;                     ///< finite, ≥ 0
+  std::span<const float> peak, peakGreen, peakBlue;  ///< finite, ≥ 0; green and blue both empty or both given
 };
 
 /// Builds the tree in parallel; the result does not depend on the number of threads.
@@ -53,6 +53,9 @@ struct OctreeInput {
 Octree buildOctree(std::span<const vec3> position, std::span<const float> radius, std::span<const float> peak,
                    std::uint32_t particlesPerCell = kDefaultParticlesPerCell);
 Octree buildOctree(const OctreeInput& input, std::uint32_t particlesPerCell = kDefaultParticlesPerCell);
+
+/// Indices of the positions in Morton order, ties by index: the order in which a tree over them has its slots.
+std::vector<std::uint32_t> mortonOrder(std::span<const vec3> position);
 
 /// Checks every promise of the layout: order, skip links, ranges, conservative and nested boxes, each particle exactly
 /// once, leaf sizes. Returns the first broken promise as a sentence, or "" if all hold. Cost O(particles · depth).

@@ -35,7 +35,7 @@ class LightPassTest : public GpuTest {
                             float cutoff) {
     LightPass pass(device(), falloff, endpoint);
     pass.setTree(tree);
-    const std::vector<float> onDevice = transmittances(pass.opticalDepths(light, cutoff), light);
+    const std::vector<float> onDevice = transmittances(pass.opticalDepths(light, {falloff, endpoint, cutoff}), light);
     const std::vector<float> onHost = transmittances(opticalDepths(tree, light, {falloff, endpoint, cutoff}), light);
     EXPECT_EQ(onDevice.size(), onHost.size());
     double worst = 0;
@@ -89,12 +89,54 @@ TEST_F(LightPassTest, GivesNothingForNoParticlesAndZerosWithoutShadows) {
   LightPass pass(device(), 0, 0);
   const Octree empty = buildOctree({}, {}, {});
   pass.setTree(empty);
-  EXPECT_TRUE(pass.opticalDepths(pointLight({0, 1, 0}), 0).empty());
+  EXPECT_TRUE(pass.opticalDepths(pointLight({0, 1, 0}), {}).empty());
   const Octree tree = ballTree(100, 0.2, 0.4, 1, 0, {0, 0, 0});
   pass.setTree(tree);
   layout::Light light = pointLight({0, 1, 0});
   light.castsShadows = 0;
-  EXPECT_EQ(pass.opticalDepths(light, 0), std::vector<float>(100, 0.0f));
+  EXPECT_EQ(pass.opticalDepths(light, {}), std::vector<float>(100, 0.0f));
+}
+
+TEST_F(LightPassTest, LightsAnyPointsInThreeColoursAndOnlyThoseReached) {
+  const Octree grey = ballTree(5000, 0.05, 0.15, 2, layout::kFalloffSmooth, {0.2f, 0.1f, -0.3f});
+  Octree tree = grey;
+  tree.peakGreen = tree.peakBlue = tree.peak;
+  std::vector<float> x, y, z;
+  std::vector<std::uint32_t> self;
+  std::vector<std::uint8_t> reached;
+  for (std::size_t slot = 0; slot < tree.particleCount(); ++slot) {
+    Random random(31, slot);
+    tree.peakGreen[slot] *= static_cast<float>(random.uniform(0, 2));
+    tree.peakBlue[slot] *= static_cast<float>(random.uniform(0, 0.2));
+    // Every other receiver is the slot's particle, the rest are points of no particle, some far outside.
+    const bool particle = slot % 2 == 0;
+    const vec3 point = particle ? tree.position(slot) : vec3(random.direction() * random.uniform(0, 20));
+    x.push_back(point.x), y.push_back(point.y), z.push_back(point.z);
+    self.push_back(particle ? static_cast<std::uint32_t>(slot) : kNoSlot);
+    reached.push_back(random.uniform() < 0.7 ? 1 : 0);
+  }
+  const Receivers receivers{x, y, z, self};
+  layout::Light spot = pointLight({2, 3, 1});
+  spot.type = layout::kLightSpot;
+  double worst = 0;
+  for (const Octree* in : {&grey, static_cast<const Octree*>(&tree)})
+    for (const layout::Light& light : {spot, directionalLight({0.2f, -1, 0.1f})}) {
+      const LightingOptions options{.cutoff = 0};
+      LightPass pass(device(), options.falloff, options.endpoint);
+      pass.setTree(*in);
+      const std::vector<float> onDevice = pass.opticalDepths(receivers, light, options, reached);
+      const std::vector<float> onHost = opticalDepths(*in, receivers, light, options, reached);
+      ASSERT_EQ(onDevice.size(), in->channels() * receivers.size());
+      ASSERT_EQ(onHost.size(), onDevice.size());
+      for (std::size_t i = 0; i < onHost.size(); ++i) {
+        worst = std::max(worst, std::abs(std::exp(-double(onHost[i])) - std::exp(-double(onDevice[i]))));
+        if (reached[i % reached.size()] == 0) {
+          ASSERT_EQ(onDevice[i], 0);
+        }
+      }
+    }
+  std::printf("worst |dT| of any receivers, grey and RGB: %.2e\n", worst);
+  EXPECT_LE(worst, 2e-5);
 }
 
 TEST_F(LightPassTest, SplitsMoreRaysThanOneSubmissionTakes) {

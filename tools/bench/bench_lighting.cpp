@@ -130,7 +130,7 @@ void benchLighting(Bench& bench) {
     LightPass pass(*device, options.falloff, options.endpoint);
     pass.setTree(tree);
     const Contender compute{"lighting in compute on the device",
-                            [&] { onDevice = pass.opticalDepths(light, options.cutoff); }};
+                            [&] { onDevice = pass.opticalDepths(light, options); }};
     times = bench.compare("lighting", "rays", host, compute, [&] {
       return both(scalarCheck(bench.count(), light, options), deviceCheck(onHost, onDevice, light, options));
     });
