@@ -149,6 +149,27 @@ layout::uint endpointCode(Endpoint endpoint) {
   return endpoint == Endpoint::Clamp ? layout::kEndpointClamp : layout::kEndpointSoft;
 }
 
+/// The scene format has words that no stage acts on yet. A picture without them would be wrong without a word.
+void refuseUnsupported(const Scene& scene, const Frame& frame) {
+  const auto refuse = [&](const char* pointer, const char* what) {
+    throw InputError(scene.path, pointer, fmt::format("a scene without {}", what), what,
+                     fmt::format("this version (Mote {}) reads but does not support it yet", MOTE_VERSION));
+  };
+  const Camera& camera = scene.camera;
+  if (!scene.solids.empty()) refuse("/solids", "solids");
+  if (camera.projection == Projection::Orthographic) refuse("/camera/type", "an orthographic camera");
+  if (camera.shutter.x != camera.shutter.y) refuse("/camera/shutter", "motion blur");
+  if (camera.apertureRadius > 0) refuse("/camera/aperture_radius", "depth of field");
+  if (!scene.view.spriteColor.empty() || !scene.view.spriteOpacity.empty()) refuse("/view", "sprites");
+  if (scene.output.pixelAspect != 1) refuse("/output/pixel_aspect", "pixels that are not square");
+  const Output& output = scene.output;
+  if (output.shadow || output.lights || output.velocity || output.opticalDepth)
+    refuse("/output/aovs", "layers other than Z");
+  if (!frame.extinction.grey()) refuse("/medium/extinction", "extinction that differs from colour to colour");
+  if (!frame.particles.emission.empty() && scene.medium.emissionScale > 0)
+    refuse("/medium/emission_scale", "particles that emit; 0 leaves the channel Emission out");
+}
+
 Frame prepareFrame(Scene& scene, int number, FrameStats& stats) {
   Frame frame;
   frame.number = stats.frame = number;
@@ -164,6 +185,7 @@ Frame prepareFrame(Scene& scene, int number, FrameStats& stats) {
     frame.lightNames.push_back(light.name);
   }
   prepareMedium(scene, frame);
+  refuseUnsupported(scene, frame);
   settleDensity(scene, frame);
   frame.density = DensityTree(DensityArrays(frame).input(), densityRules(scene));
   const Camera camera = cameraAt(scene.camera, number);
@@ -229,7 +251,12 @@ LitParticles lightParticles(const Frame& frame, const OpticalDepthSource& source
   return lit;
 }
 
-std::vector<layout::SplatParticle> splatParticles(const Frame& frame, const Medium& medium, const LitParticles& lit) {
+std::vector<layout::SplatParticle> splatParticles(const Frame& frame, const Medium& medium, const View& view,
+                                                  const LitParticles& lit) {
+  // A cross-section spread over a disc s times as wide is 1/s² of it in the middle; in mode peak the peak stays.
+  const float spread =
+      medium.densityMode == DensityMode::CrossSection ? 1 / (view.radiusScale * view.radiusScale) : 1.0f;
+  const float peakScale = spread * frame.extinction.uniform.x;  // grey, see refuseUnsupported
   const Receivers receivers = frame.density.receivers();
   const std::vector<std::uint32_t>& source = frame.density.source();
   const ParticleSet& particles = frame.particles;
@@ -241,9 +268,9 @@ std::vector<layout::SplatParticle> splatParticles(const Frame& frame, const Medi
       const vec3 albedo = singleScatteringAlbedo(medium.albedo * own,
                                                  particles.absorption.empty() ? nullptr : &particles.absorption[i]);
       splats[k] = {.position = receivers.position(k),
-                   .radius = particles.radius[i],
+                   .radius = particles.radius[i] * view.radiusScale,
                    .radiance = albedo * lit.radiance[k],
-                   .peak = frame.peak[i]};
+                   .peak = std::min(frame.peak[i] * peakScale, std::numeric_limits<float>::max())};
     }
   });
   return splats;

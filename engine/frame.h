@@ -48,7 +48,8 @@ OpticalDepthSource hostOpticalDepths(const Frame& frame);
 LitParticles lightParticles(const Frame& frame, const OpticalDepthSource& source, bool keepTransmittance);
 
 /// What the splat stage draws, in the order of the receivers: radiance is albedo · Color · in-scattered radiance.
-std::vector<layout::SplatParticle> splatParticles(const Frame& frame, const Medium& medium, const LitParticles& lit);
+std::vector<layout::SplatParticle> splatParticles(const Frame& frame, const Medium& medium, const View& view,
+                                                  const LitParticles& lit);
 
 /// Shader codes of the scene's choices.
 layout::uint falloffCode(Falloff falloff);

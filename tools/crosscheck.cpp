@@ -36,7 +36,7 @@ Side run(const Frame& frame, const Scene& scene, Backends backends, Gpu* gpu) {
   Renderer renderer(backends, gpu);
   side.lit = renderer.light(frame, true, side.stats);
   side.image =
-      renderer.draw(frame, splatParticles(frame, scene.medium, side.lit), scene.output.depth, side.stats, &side.order);
+      renderer.draw(frame, splatParticles(frame, scene.medium, scene.view, side.lit), scene.output.depth, side.stats, &side.order);
   return side;
 }
 

@@ -63,7 +63,7 @@ void renderFrame(Scene& scene, int number, const RenderOptions& options, Rendere
   std::vector<layout::SplatParticle> splats;
   {
     const LitParticles lit = renderer.light(frame, false, stats);
-    splats = splatParticles(frame, scene.medium, lit);
+    splats = splatParticles(frame, scene.medium, scene.view, lit);
   }
   const Image image = renderer.draw(frame, splats, scene.output.depth, stats);
   Timer write;

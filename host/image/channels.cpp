@@ -13,7 +13,8 @@ std::vector<ChannelView> channelsOf(Image& image) {
   const auto add = [&](const char* name, float* first, std::size_t stride, bool colour, float empty = 0) {
     views.push_back({name, first, stride, colour, empty});
   };
-  float* const rgba = pixels > 0 ? &image.pixels[0].x : nullptr;
+  if (pixels == 0) return {};
+  float* const rgba = &image.pixels[0].x;
   const char* const colours[] = {"R", "G", "B", "A"};
   for (std::size_t c = 0; c < 4; ++c) add(colours[c], rgba + c, 4, true);
   if (!image.alpha.empty()) {
