@@ -11,8 +11,8 @@
 
 #include "host/core/error.h"
 #include "host/image/exr.h"
-#include "host/particles/missing_file.h"
 #include "host/particles/prt_format.h"
+#include "host/scene/missing_file.h"
 #include "tools/command.h"
 
 namespace mote {

@@ -13,10 +13,10 @@
 #include "host/core/log.h"
 #include "host/core/parallel.h"
 #include "host/particles/generate.h"
-#include "host/particles/missing_file.h"
 #include "host/particles/prt_reader.h"
 #include "host/particles/spacing.h"
 #include "host/scene/frame_path.h"
+#include "host/scene/missing_file.h"
 
 namespace mote {
 namespace {

@@ -1,4 +1,4 @@
-// What to tell a user whose particle file does not exist.
+// What to tell a user whose file does not exist.
 #pragma once
 #include <string>
 

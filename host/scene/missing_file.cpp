@@ -1,4 +1,4 @@
-#include "host/particles/missing_file.h"
+#include "host/scene/missing_file.h"
 
 #include <fmt/format.h>
 
