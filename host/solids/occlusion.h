@@ -15,7 +15,8 @@ namespace mote {
 
 /// One byte a receiver. Only receivers with wanted[k] ≠ 0 are asked (empty: all); the others get 0, and so does
 /// everything where light.castsShadows is 0. Any type of light but a directional one is a point. Does not depend on
-/// the number of threads; engine/passes/solid_pass.h gives the same bytes. About 0.5 µs a ray of one core.
+/// the number of threads; engine/passes/solid_pass.h gives the same bytes. 0.1 µs a ray of one core among 6,000
+/// triangles, 1 µs among a million.
 std::vector<std::uint8_t> occluded(const SolidTree& tree, const Receivers& receivers,
                                    std::span<const std::uint8_t> wanted, const layout::Light& light);
 

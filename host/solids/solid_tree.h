@@ -29,7 +29,7 @@ struct SolidTree {
 std::vector<layout::Triangle> shadowTriangles(std::span<const Solid> solids, std::span<const Mesh> meshes);
 
 /// Builds the tree of finite triangles, up to 2³² − 2; none give a tree that is in nobody's way. One thread builds it,
-/// so that it is a function of the triangles alone: 0.5 s a million. Throws MachineError where memory ends.
+/// so that it is a function of the triangles alone: 1 s a million. Throws MachineError where memory ends.
 SolidTree buildSolidTree(std::span<const layout::Triangle> triangles);
 
 /// Checks every promise of the layout: each triangle once, skip links, ranges, boxes that hold their triangles with
