@@ -11,6 +11,8 @@ find_package(nlohmann_json REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(Vulkan REQUIRED)
 find_package(OpenSSL REQUIRED COMPONENTS Crypto)
+find_package(assimp REQUIRED CONFIG)
+find_package(embree 3 REQUIRED CONFIG)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
 

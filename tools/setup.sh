@@ -8,7 +8,8 @@ packages=(
   libvulkan1 libvulkan-dev libvulkan-volk-dev mesa-vulkan-drivers vulkan-validationlayers
   glslang-tools spirv-tools
   libglm-dev libtbb-dev libopenexr-dev libpng-dev zlib1g-dev libssl-dev
-  libcli11-dev nlohmann-json3-dev libfmt-dev libhwy-dev libgtest-dev
+  libassimp-dev libembree-dev libcli11-dev nlohmann-json3-dev libfmt-dev libhwy-dev libgtest-dev
+  imagemagick
 )
 
 # One line a package that dpkg knows, "g++ ii "; those it does not know are missing as well.

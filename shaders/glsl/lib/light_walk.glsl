@@ -22,16 +22,12 @@ layout(constant_id = 3) const uint kEndpoint = 0;
 layout(constant_id = 4) const uint kChannels = 1;
 layout(constant_id = 5) const bool kOwnSlots = true;  // receiver k is slot k
 
+#include "cap.glsl"
 #include "falloff.glsl"
 
 layout(push_constant, scalar) uniform Push { LightParams params; };
 
 const float kEndless = 1e30;  // length of a ray toward a directional light
-
-float cap(float t, float halfChord) {
-  const float x = clamp(t / max(halfChord, 1e-30), -1.0, 1.0);
-  return 0.5 + x * (0.75 - 0.25 * (x * x));
-}
 
 void main() {
   // Consecutive rays in each lane: a subgroup's rays are neighbours whatever its size. Lanes past the end repeat the
