@@ -2,18 +2,18 @@
 
 #include <cmath>
 
+#include "engine/splats.h"
 #include "host/core/error.h"
 #include "host/core/log.h"
 #include "host/core/parallel.h"
 #include "host/core/sha256.h"
 #include "host/core/timer.h"
 #include "host/lighting/auto_subsample.h"
-#include "host/lighting/irradiance.h"
 #include "host/lighting/medium.h"
 #include "host/particles/particle_loader.h"
-#include "host/scene/camera_path.h"
 #include "host/scene/fitting.h"
-#include "host/splat/splat.h"
+#include "host/scene/frame_path.h"
+#include "host/solids/mesh.h"
 
 namespace mote {
 namespace {
@@ -126,6 +126,16 @@ Viewer viewerOf(const layout::SplatCamera& camera) {
   return {.eye = camera.position, .parallel = camera.orthographic != 0, .toCamera = -camera.forward};
 }
 
+/// Meshes of the frame and the tree of those that cast shadows; adds their files to `files`.
+void prepareSolids(const Scene& scene, Frame& frame, std::vector<std::string>& files) {
+  for (const Solid& solid : scene.solids) {
+    frame.meshes.push_back(loadMesh(solid, frame.number));
+    files.push_back(framePath(solid.file, frame.number));
+  }
+  frame.solidTree = buildSolidTree(shadowTriangles(scene.solids, frame.meshes));
+  frame.solidLight = 1 - scene.lighting.solidShadowIntensity;
+}
+
 PhaseFunction phaseOf(const Phase& phase) {
   switch (phase.type) {
     case PhaseType::HenyeyGreenstein: return {PhaseKind::HenyeyGreenstein, phase.g};
@@ -149,34 +159,12 @@ layout::uint endpointCode(Endpoint endpoint) {
   return endpoint == Endpoint::Clamp ? layout::kEndpointClamp : layout::kEndpointSoft;
 }
 
-/// The scene format has words that no stage acts on yet. A picture without them would be wrong without a word.
-void refuseUnsupported(const Scene& scene, const Frame& frame) {
-  const auto refuse = [&](const char* pointer, const char* what) {
-    throw InputError(scene.path, pointer, fmt::format("a scene without {}", what), what,
-                     fmt::format("this version (Mote {}) reads but does not support it yet", MOTE_VERSION));
-  };
-  const Camera& camera = scene.camera;
-  if (!scene.solids.empty()) refuse("/solids", "solids");
-  if (camera.projection == Projection::Orthographic) refuse("/camera/type", "an orthographic camera");
-  if (camera.shutter.x != camera.shutter.y) refuse("/camera/shutter", "motion blur");
-  if (camera.apertureRadius > 0) refuse("/camera/aperture_radius", "depth of field");
-  if (!scene.view.spriteColor.empty() || !scene.view.spriteOpacity.empty()) refuse("/view", "sprites");
-  if (scene.output.pixelAspect != 1) refuse("/output/pixel_aspect", "pixels that are not square");
-  const Output& output = scene.output;
-  if (output.shadow || output.lights || output.velocity || output.opticalDepth)
-    refuse("/output/aovs", "layers other than Z");
-  if (!frame.extinction.grey()) refuse("/medium/extinction", "extinction that differs from colour to colour");
-  if (!frame.particles.emission.empty() && scene.medium.emissionScale > 0)
-    refuse("/medium/emission_scale", "particles that emit; 0 leaves the channel Emission out");
-}
-
 Frame prepareFrame(Scene& scene, int number, FrameStats& stats) {
   Frame frame;
   frame.number = stats.frame = number;
   Timer timer;
   std::vector<std::string> files;
   frame.particles = loadParticles(scene.particles, number, scene.medium.densityMode, &files);
-  stats.inputs = hashInputs(files);
   stats.seconds["load"] = timer.lap();
 
   fitDefaults(scene, frame.particles.supportBounds());
@@ -184,13 +172,13 @@ Frame prepareFrame(Scene& scene, int number, FrameStats& stats) {
     frame.lights.push_back(toLight(light));
     frame.lightNames.push_back(light.name);
   }
+  prepareSolids(scene, frame, files);
+  stats.inputs = hashInputs(files);
   prepareMedium(scene, frame);
-  refuseUnsupported(scene, frame);
   settleDensity(scene, frame);
   frame.density = DensityTree(DensityArrays(frame).input(), densityRules(scene));
-  const Camera camera = cameraAt(scene.camera, number);
-  frame.view = makeSplatCamera(camera.position, camera.target, camera.up, camera.fov, camera.near, camera.far,
-                               scene.output.size.x, scene.output.size.y, frame.rules.falloff);
+  frame.blank = blankSplats(scene, number, frame.rules.falloff);
+  frame.view = frame.blank.camera();
   frame.scattering = {phaseOf(scene.medium.phase), viewerOf(frame.view)};
 
   stats.densityScale = scene.medium.densityScale;
@@ -202,78 +190,6 @@ Frame prepareFrame(Scene& scene, int number, FrameStats& stats) {
   stats.radius = radiusRange(frame.particles);
   stats.seconds["octree"] = timer.lap();
   return frame;
-}
-
-OpticalDepthSource hostOpticalDepths(const Frame& frame) {
-  return [&frame](const Receivers& receivers, const layout::Light& light, std::span<const std::uint8_t> reached,
-                  const RaysDone& done) {
-    return opticalDepths(frame.density.tree(), receivers, light, frame.rules, reached, done);
-  };
-}
-
-namespace {
-
-/// Support radii in the order of the receivers.
-std::vector<float> receiverRadii(const Frame& frame) {
-  const std::vector<std::uint32_t>& source = frame.density.source();
-  std::vector<float> radii(source.size());
-  for (std::size_t k = 0; k < radii.size(); ++k) radii[k] = frame.particles.radius[source[k]];
-  return radii;
-}
-
-/// Which receivers a light can reach; empty: all.
-std::vector<std::uint8_t> reachedBy(const layout::Light& light, const Receivers& receivers) {
-  if (light.type != layout::kLightSpot) return {};
-  std::vector<std::uint8_t> reached(receivers.size());
-  parallelBlocks(reached.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) reached[k] = reaches(light, receivers.position(k)) ? 1 : 0;
-  });
-  return reached;
-}
-
-}  // namespace
-
-LitParticles lightParticles(const Frame& frame, const OpticalDepthSource& source, bool keepTransmittance) {
-  const Receivers receivers = frame.density.receivers();
-  const std::size_t count = receivers.size();
-  const std::vector<float> radii = receiverRadii(frame);
-  LitParticles lit;
-  lit.radiance.assign(count, vec3(0));
-  Progress progress("lighting", static_cast<double>(count) * static_cast<double>(frame.lights.size()));
-  for (const layout::Light& light : frame.lights) {
-    const std::vector<std::uint8_t> reached = reachedBy(light, receivers);
-    const std::vector<float> depths =
-        source(receivers, light, reached, [&](std::size_t rays) { progress.advance(static_cast<double>(rays)); });
-    std::vector<float> transmittance = transmittances(depths, count, light, frame.rules.extinction);
-    addInScattering(receivers, radii, light, transmittance, {}, frame.scattering, lit.radiance);
-    if (keepTransmittance) lit.transmittance.push_back(std::move(transmittance));
-  }
-  return lit;
-}
-
-std::vector<layout::SplatParticle> splatParticles(const Frame& frame, const Medium& medium, const View& view,
-                                                  const LitParticles& lit) {
-  // A cross-section spread over a disc s times as wide is 1/s² of it in the middle; in mode peak the peak stays.
-  const float spread =
-      medium.densityMode == DensityMode::CrossSection ? 1 / (view.radiusScale * view.radiusScale) : 1.0f;
-  const float peakScale = spread * frame.extinction.uniform.x;  // grey, see refuseUnsupported
-  const Receivers receivers = frame.density.receivers();
-  const std::vector<std::uint32_t>& source = frame.density.source();
-  const ParticleSet& particles = frame.particles;
-  std::vector<layout::SplatParticle> splats(receivers.size());
-  parallelBlocks(splats.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      const std::size_t i = source[k];
-      const vec3 own = particles.color.empty() ? particles.uniformColor : particles.color[i];
-      const vec3 albedo = singleScatteringAlbedo(medium.albedo * own,
-                                                 particles.absorption.empty() ? nullptr : &particles.absorption[i]);
-      splats[k] = {.position = receivers.position(k),
-                   .radius = particles.radius[i] * view.radiusScale,
-                   .radiance = albedo * lit.radiance[k],
-                   .peak = std::min(frame.peak[i] * peakScale, std::numeric_limits<float>::max())};
-    }
-  });
-  return splats;
 }
 
 }  // namespace mote

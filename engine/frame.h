@@ -10,7 +10,8 @@
 #include "host/lighting/medium.h"
 #include "host/particles/particle_set.h"
 #include "host/scene/scene.h"
-#include "shaders/glsl/layout/splat.h"
+#include "host/solids/solid_tree.h"
+#include "host/splat/splat_set.h"
 
 namespace mote {
 
@@ -24,7 +25,11 @@ struct Frame {
   std::vector<std::string> lightNames;
   LightingOptions rules;  ///< falloff, endpoint, cutoff, extinction where it is uniform
   Scattering scattering;
+  std::vector<Mesh> meshes;  ///< of scene.solids, in their order
+  SolidTree solidTree;       ///< of the triangles that cast shadows
+  float solidLight = 0;      ///< share of the light that passes a solid: 1 − solid_shadow_intensity
   layout::SplatCamera view;  ///< the camera as the splats take it
+  SplatSet blank;            ///< … at every moment that counts, and sprites; no particles
 };
 
 /// Loads and builds; fills `stats` (counts, radius, density scale, inputs, seconds of load and octree).
@@ -32,24 +37,6 @@ struct Frame {
 /// the first frame that is prepared and written into `scene`, so that a sequence neither jitters nor flickers.
 /// Throws InputError as readers and loaders do.
 Frame prepareFrame(Scene& scene, int number, FrameStats& stats);
-
-/// What the lights do to the particles, in the order of the receivers.
-struct LitParticles {
-  std::vector<vec3> radiance;                     ///< in-scattered radiance Σ p·E·T [W/(m² sr)], before the albedo
-  std::vector<std::vector<float>> transmittance;  ///< one a light, [channel][receiver]; empty unless asked for
-};
-
-/// A function that gives optical depths toward a light, as mote::opticalDepths: on the host or on a device.
-using OpticalDepthSource = std::function<std::vector<float>(const Receivers&, const layout::Light&,
-                                                            std::span<const std::uint8_t> reached, const RaysDone&)>;
-OpticalDepthSource hostOpticalDepths(const Frame& frame);
-
-/// Lights every particle with every light of the frame; the cost is linear in lights. Shows progress.
-LitParticles lightParticles(const Frame& frame, const OpticalDepthSource& source, bool keepTransmittance);
-
-/// What the splat stage draws, in the order of the receivers: radiance is albedo · Color · in-scattered radiance.
-std::vector<layout::SplatParticle> splatParticles(const Frame& frame, const Medium& medium, const View& view,
-                                                  const LitParticles& lit);
 
 /// Shader codes of the scene's choices.
 layout::uint falloffCode(Falloff falloff);

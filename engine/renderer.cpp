@@ -1,13 +1,18 @@
 #include "engine/renderer.h"
 
-#include "engine/passes/depth_key_pass.h"
-#include "engine/passes/sort_pass.h"
-#include "engine/vulkan/barrier.h"
+#include <algorithm>
+#include <optional>
+
+#include "engine/passes/light_pass.h"
+#include "engine/passes/solid_pass.h"
+#include "engine/picture.h"
+#include "engine/splats.h"
 #include "host/core/error.h"
 #include "host/core/log.h"
 #include "host/core/parallel.h"
 #include "host/core/timer.h"
 #include "host/lighting/kernel.h"
+#include "host/solids/surfaces.h"
 #include "host/splat/splat.h"
 
 namespace mote {
@@ -24,10 +29,6 @@ std::unique_ptr<Gpu> tryOpen(const DeviceOptions& options, bool needed, std::str
     why = error.what();
     return nullptr;
   }
-}
-
-void addDeviceSeconds(FrameStats& stats, const TimestampQueries& queries) {
-  for (const StageTime& time : queries.results()) stats.deviceSeconds[time.stage] += time.seconds;
 }
 
 }  // namespace
@@ -56,83 +57,72 @@ Renderer::Renderer(Backends backends, Gpu* gpu) : backends_(backends), gpu_(gpu)
   MOTE_CHECK(backends.anyGpu() && gpu == nullptr, ==, false);
 }
 
-LitParticles Renderer::light(const Frame& frame, bool keepTransmittance, FrameStats& stats) {
+LightWanted lightWanted(const Scene& scene) { return {.byLight = scene.output.lights}; }
+
+namespace {
+
+/// The device's passes behind ShadowSources.
+struct DeviceShadows {
+  LightPass light;
+  SolidPass solids;
+
+  DeviceShadows(const Device& device, const Frame& frame)
+      : light(device, frame.rules.falloff, frame.rules.endpoint), solids(device) {
+    light.setTree(frame.density.tree());
+    if (!frame.solidTree.empty()) solids.setTree(frame.solidTree);
+  }
+
+  ShadowSources sources(const Frame& frame) {
+    return {.opticalDepths =
+                [&](const Receivers& receivers, const layout::Light& from, std::span<const std::uint8_t> reached,
+                    const RaysDone& done) { return light.opticalDepths(receivers, from, frame.rules, reached, done); },
+            .occluded = [&](const Receivers& receivers, std::span<const std::uint8_t> wanted,
+                            const layout::Light& from) { return solids.occluded(receivers, wanted, from); }};
+  }
+
+  void addTo(FrameStats& stats) const {
+    stats.deviceSeconds["lighting"] += light.deviceSeconds() + solids.deviceSeconds();
+    stats.deviceBytes = std::max(stats.deviceBytes, light.deviceBytes() + solids.deviceBytes());
+  }
+};
+
+}  // namespace
+
+LitParticles Renderer::light(const Frame& frame, LightWanted wanted, FrameStats& stats) {
   Timer timer;
   LitParticles lit;
   if (backends_.gpuLighting) {
-    LightPass pass(gpu_->device(), frame.rules.falloff, frame.rules.endpoint);
-    pass.setTree(frame.density.tree());
-    lit = lightParticles(
-        frame,
-        [&](const Receivers& receivers, const layout::Light& light, std::span<const std::uint8_t> reached,
-            const RaysDone& done) { return pass.opticalDepths(receivers, light, frame.rules, reached, done); },
-        keepTransmittance);
-    stats.deviceSeconds["lighting"] += pass.deviceSeconds();
-    stats.deviceBytes = std::max(stats.deviceBytes, pass.deviceBytes());
+    DeviceShadows device(gpu_->device(), frame);
+    lit = lightParticles(frame, device.sources(frame), wanted);
+    device.addTo(stats);
   } else {
-    lit = lightParticles(frame, hostOpticalDepths(frame), keepTransmittance);
+    lit = lightParticles(frame, hostShadows(frame), wanted);
   }
   stats.seconds["lighting"] += timer.lap();
   return lit;
 }
 
-Image Renderer::draw(const Frame& frame, const std::vector<layout::SplatParticle>& splats, bool withDepth,
-                     FrameStats& stats, std::vector<layout::uint>* order) {
+Image Renderer::draw(const Frame& frame, const Scene& scene, LitParticles lit, FrameStats& stats,
+                     std::vector<layout::uint>* order) {
+  Timer timer;
+  Surfaces surfaces;
+  const bool seen = std::any_of(scene.solids.begin(), scene.solids.end(),
+                                [](const Solid& solid) { return solid.mode != SolidMode::Hidden; });
+  if (seen) surfaces = traceSurfaces(scene.solids, frame.meshes, frame.view);
+  std::optional<DeviceShadows> device;
+  if (!surfaces.empty() && backends_.gpuLighting) device.emplace(gpu_->device(), frame);
+  if (seen) stats.seconds["solids"] += timer.lap();
+
+  SplatSet set = splatSet(frame, scene, lit.radiance);
+  lit.radiance = {};
   const float keyScale = depthKeyScale(frame.particles.bounds(), frame.view.position);
-  return backends_.gpuRaster ? drawOnDevice(frame, splats, keyScale, withDepth, stats, order)
-                             : drawOnHost(frame, splats, keyScale, withDepth, stats, order);
-}
-
-Image Renderer::drawOnHost(const Frame& frame, const std::vector<layout::SplatParticle>& splats, float keyScale,
-                           bool withDepth, FrameStats& stats, std::vector<layout::uint>* order) {
-  Timer timer;
-  std::vector<layout::uint> sorted = sortByDepth(splats, frame.view, keyScale);
-  stats.seconds["sort"] += timer.lap();
-  Image image = rasterize(splats, sorted, frame.view, withDepth);
-  stats.seconds["splat"] += timer.lap();
-  if (order) *order = std::move(sorted);
-  return image;
-}
-
-Image Renderer::drawOnDevice(const Frame& frame, const std::vector<layout::SplatParticle>& splats, float keyScale,
-                             bool withDepth, FrameStats& stats, std::vector<layout::uint>* order) {
-  const Device& device = gpu_->device();
-  const auto count = static_cast<std::uint32_t>(splats.size());
-  Timer timer;
-  const Buffer particles = device.createBufferWith<layout::SplatParticle>(splats);
-  const Buffer indices = device.createBuffer(count * sizeof(std::uint32_t));
-  {
-    const Buffer pairs = device.createBuffer(SortPass::pairBytes(count));
-    const DepthKeyPass keys(device);
-    const SortPass sort(device);
-    TimestampQueries queries = device.createTimestampQueries(1);
-    device.run([&](CommandBuffer& commands) {
-      const std::uint32_t span = queries.begin(commands, "sort");
-      keys.record(commands, particles, count, frame.view.position, keyScale, pairs);
-      sort.record(commands, pairs, count);
-      sort.recordExtract(commands, pairs, count, indices);
-      queries.end(commands, span);
-      commands.barrier(barrier::computeToIndexAndVertexInput);
-    });
-    addDeviceSeconds(stats, queries);
-    stats.deviceBytes = std::max(stats.deviceBytes, particles.size() + indices.size() + pairs.size());
-  }
-  if (order) *order = device.download<layout::uint>(indices, count);
-  stats.seconds["sort"] += timer.lap();
-
-  const SplatPass pass(device, frame.rules.falloff, withDepth);
-  const SplatTarget target = pass.createTarget(static_cast<std::uint32_t>(frame.view.imageSize.x),
-                                               static_cast<std::uint32_t>(frame.view.imageSize.y));
-  TimestampQueries queries = device.createTimestampQueries(pass.submissions(count));
-  Progress progress("splat", count);
-  std::uint32_t drawn = 0;
-  pass.draw(target, particles, indices, count, frame.view, &queries, [&](std::uint32_t soFar) {
-    progress.advance(soFar - drawn);
-    drawn = soFar;
-  });
-  Image image = pass.download(target);
-  addDeviceSeconds(stats, queries);
-  stats.seconds["splat"] += timer.lap();
+  const std::unique_ptr<Rasterizer> rasterizer = backends_.gpuRaster
+                                                     ? deviceRasterizer(gpu_->device(), set, keyScale, stats)
+                                                     : hostRasterizer(set, keyScale, stats);
+  if (order) *order = rasterizer->order();
+  Image image = makePicture(frame, scene, set, std::move(lit), surfaces, *rasterizer,
+                            device ? device->sources(frame) : hostShadows(frame));
+  if (device) device->addTo(stats);
   return image;
 }
 

@@ -2,9 +2,7 @@
 #pragma once
 #include <memory>
 
-#include "engine/frame.h"
-#include "engine/passes/light_pass.h"
-#include "engine/passes/splat_pass.h"
+#include "engine/lighting.h"
 #include "engine/vulkan/gpu.h"
 #include "host/image/image.h"
 
@@ -21,24 +19,24 @@ struct Backends {
 /// stderr, where the work is done. Throws MachineError when Gpu is asked for and there is no usable device.
 Backends chooseBackends(Backend lighting, Backend raster, const DeviceOptions& options, std::unique_ptr<Gpu>& gpu);
 
+/// What draw() needs of the light beside its sum.
+LightWanted lightWanted(const Scene& scene);
+
 class Renderer {
  public:
   /// `gpu` may be null where `backends` names no device; it must outlive the renderer.
   Renderer(Backends backends, Gpu* gpu);
 
   /// Lights the particles; adds seconds["lighting"] and, on the device, deviceSeconds["lighting"].
-  LitParticles light(const Frame& frame, bool keepTransmittance, FrameStats& stats);
+  LitParticles light(const Frame& frame, LightWanted wanted, FrameStats& stats);
 
-  /// Sorts and splats; adds seconds and deviceSeconds of sort and splat. `order`, if given, gets the sorted slots.
-  Image draw(const Frame& frame, const std::vector<layout::SplatParticle>& splats, bool withDepth, FrameStats& stats,
+  /// Sorts, splats, and lays solids and medium over each other, with the layers of scene.output (picture.h); adds
+  /// seconds and deviceSeconds of solids, sort and splat. `lit` as lightWanted(scene) asks. `order`, if given, gets the
+  /// sorted slots.
+  Image draw(const Frame& frame, const Scene& scene, LitParticles lit, FrameStats& stats,
              std::vector<layout::uint>* order = nullptr);
 
  private:
-  Image drawOnHost(const Frame& frame, const std::vector<layout::SplatParticle>& splats, float keyScale, bool withDepth,
-                   FrameStats& stats, std::vector<layout::uint>* order);
-  Image drawOnDevice(const Frame& frame, const std::vector<layout::SplatParticle>& splats, float keyScale,
-                     bool withDepth, FrameStats& stats, std::vector<layout::uint>* order);
-
   Backends backends_;
   Gpu* gpu_;
 };

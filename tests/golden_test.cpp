@@ -21,8 +21,8 @@ class Golden : public GpuTest, public ::testing::WithParamInterface<const char*>
     FrameStats stats;
     const Frame frame = prepareFrame(scene, scene.frames.first, stats);
     Renderer renderer(backends, &GpuEnvironment::instance().gpu());
-    const LitParticles lit = renderer.light(frame, false, stats);
-    const Image image = renderer.draw(frame, splatParticles(frame, scene.medium, scene.view, lit), true, stats);
+    scene.output.depth = true;
+    const Image image = renderer.draw(frame, scene, renderer.light(frame, {}, stats), stats);
     const ImageDifference difference = compareImages(image, readExr(base + ".exr"));
     // A different libm or compiler may move a particle of the generators by a rounding step; a wrong picture is off by
     // far more.

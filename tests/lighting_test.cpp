@@ -163,7 +163,7 @@ TEST(Lighting, InScatteringFollowsTheInverseSquareAndTheIsotropicPhase) {
   light.power = {8, 4, 2};
   std::vector<vec3> radiance(3, vec3(0));
   const std::vector<float> some{1.0f, 0.5f, 1.0f}, all(3, 1.0f);
-  addInScattering(slotsOf(tree), radius, light, some, {}, {}, radiance);
+  addInScattering(slotsOf(tree), radius, light, some, {}, radiance);
   const double isotropic = 1 / (4 * kPi);
   for (std::size_t slot = 0; slot < 3; ++slot) {
     const double distance = 2 - tree.y[slot];
@@ -176,7 +176,7 @@ TEST(Lighting, InScatteringFollowsTheInverseSquareAndTheIsotropicPhase) {
   for (const float decay : {0.0f, 1.0f, 1.5f}) {
     light.decay = decay;
     std::vector<vec3> other(3, vec3(0));
-    addInScattering(slotsOf(tree), radius, light, all, {}, {}, other);
+    addInScattering(slotsOf(tree), radius, light, all, {}, other);
     EXPECT_NEAR(other[0].x, isotropic * 8 / std::pow(2.0, decay), 1e-6);
   }
 }

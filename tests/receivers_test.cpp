@@ -195,20 +195,19 @@ TEST(Irradiance, AConeWithoutASoftRimIsAStep) {
   EXPECT_EQ(irradiance(light, {0.57f, 0, -1}, 0).x, irradiance(light, {0, 0.57f, -1}, 0).x);
 }
 
-TEST(InScattering, TakesPhaseColourAndSolidsIntoAccount) {
+TEST(InScattering, TakesPhaseAndColourIntoAccount) {
   const std::vector<float> x{0, 0}, y{0, 0}, z{0, -1}, radius{0.1f, 0.1f}, transmittance{1, 0.5f, 0.5f, 0.25f, 0, 1};
-  const std::vector<float> visibility{1, 0.5f};
   const Receivers receivers{x, y, z, {}};
   const layout::Light light = directionalLight({0, 0, -1});
   // Seen from +x: the light turns by 90°.
   const Scattering scattering{{PhaseKind::HenyeyGreenstein, 0.5f},
                               {.eye = {0, 0, 0}, .parallel = true, .toCamera = {1, 0, 0}}};
   std::vector<vec3> radiance(2, vec3(0));
-  addInScattering(receivers, radius, light, transmittance, visibility, scattering, radiance);
+  addInScattering(receivers, radius, light, transmittance, scattering, radiance);
   const float phase = 0.75f / (4 * static_cast<float>(kPi) * std::pow(1.25f, 1.5f));
   for (int c = 0; c < 3; ++c) {
     EXPECT_NEAR(radiance[0][c], phase * transmittance[2 * c], 1e-6);
-    EXPECT_NEAR(radiance[1][c], phase * 0.5f * transmittance[2 * c + 1], 1e-6);
+    EXPECT_NEAR(radiance[1][c], phase * transmittance[2 * c + 1], 1e-6);
   }
 }
 

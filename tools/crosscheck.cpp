@@ -25,7 +25,7 @@ struct CrosscheckOptions {
 
 /// One backend's results of the frame.
 struct Side {
-  LitParticles lit;
+  std::vector<std::vector<float>> transmittance;  ///< one a light, [channel][receiver]
   std::vector<layout::uint> order;
   Image image;
   FrameStats stats;
@@ -34,9 +34,11 @@ struct Side {
 Side run(const Frame& frame, const Scene& scene, Backends backends, Gpu* gpu) {
   Side side;
   Renderer renderer(backends, gpu);
-  side.lit = renderer.light(frame, true, side.stats);
-  side.image =
-      renderer.draw(frame, splatParticles(frame, scene.medium, scene.view, side.lit), scene.output.depth, side.stats, &side.order);
+  LightWanted wanted = lightWanted(scene);
+  wanted.transmittance = true;
+  LitParticles lit = renderer.light(frame, wanted, side.stats);
+  side.transmittance = std::move(lit.transmittance);
+  side.image = renderer.draw(frame, scene, std::move(lit), side.stats, &side.order);
   return side;
 }
 
@@ -48,7 +50,7 @@ struct LightDifference {
 
 LightDifference compareLight(const Frame& frame, std::size_t light, const Side& host, const Side& device) {
   LightDifference difference{frame.lightNames[light]};
-  const std::vector<float>&a = host.lit.transmittance[light], &b = device.lit.transmittance[light];
+  const std::vector<float>&a = host.transmittance[light], &b = device.transmittance[light];
   for (std::size_t slot = 0; slot < a.size(); ++slot) {
     double delta = std::abs(double(a[slot]) - double(b[slot]));
     if (!std::isfinite(delta)) delta = std::numeric_limits<double>::infinity();  // not a number on either side

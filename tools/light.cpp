@@ -62,7 +62,7 @@ void light(const LightOptions& options, const CommonOptions& common) {
   Renderer renderer(backends, gpu.get());
   FrameStats stats;
   const Frame frame = prepareFrame(scene, number, stats);
-  const LitParticles lit = renderer.light(frame, true, stats);
+  const LitParticles lit = renderer.light(frame, {.transmittance = true}, stats);
   requireNoValidationMessages(gpu.get());
   writeLit(path, frame, lit);
   logInfo(fmt::format("frame {}: {} particles, {} lights, lighting {:.1f} s -> {}", number, stats.particles,

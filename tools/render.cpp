@@ -60,12 +60,7 @@ void renderFrame(Scene& scene, int number, const RenderOptions& options, Rendere
   Timer total;
   const std::string path = framePath(scene.output.file, number);
   const Frame frame = prepareFrame(scene, number, stats);
-  std::vector<layout::SplatParticle> splats;
-  {
-    const LitParticles lit = renderer.light(frame, false, stats);
-    splats = splatParticles(frame, scene.medium, scene.view, lit);
-  }
-  const Image image = renderer.draw(frame, splats, scene.output.depth, stats);
+  const Image image = renderer.draw(frame, scene, renderer.light(frame, lightWanted(scene), stats), stats);
   Timer write;
   stats.warnings = takeWarnings();
   writeFrameExr(path, image, frame, scene, run, stats);

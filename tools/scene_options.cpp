@@ -47,6 +47,7 @@ void writeFrameExr(const std::string& path, const Image& image, const Frame& fra
   options.worldToNDC = worldToNdc(frame.view);
   options.framesPerSecond = scene.frames.fps;
   options.frame = frame.number;
+  options.pixelAspectRatio = scene.output.pixelAspect;
   options.strings = {{"mote:version", MOTE_VERSION}, {"mote:stats", reproducibleStatsJson(run, stats)}};
   writeExr(path, image, options);
 }

@@ -17,10 +17,10 @@ DepthKeyPass::DepthKeyPass(const Device& device)
                                              std::array{SpecializationConstant{0, kGroupSize}})) {}
 
 void DepthKeyPass::record(CommandBuffer& commands, const Buffer& particles, std::uint32_t count, const vec3& camera,
-                          float scale, const Buffer& pairs) const {
+                          float scale, const Buffer& pairs, const vec3& axis) const {
   MOTE_CHECK(particles.size(), >=, count * std::uint64_t{sizeof(layout::SplatParticle)});
   MOTE_CHECK(pairs.size(), >=, count * std::uint64_t{sizeof(layout::SortPair)});
-  const layout::DepthKeyParams params{particles.address(), pairs.address(), camera, scale, count, 0};
+  const layout::DepthKeyParams params{particles.address(), pairs.address(), camera, scale, axis, count};
   commands.dispatchRow(pipeline_, params, (std::uint64_t{count} + kGroupSize - 1) / kGroupSize);
 }
 

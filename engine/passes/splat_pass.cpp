@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "engine/passes/picture_size.h"
 #include "host/core/error.h"
 #include "host/splat/splat.h"
 #include "shaders/glsl/layout/splat_params.h"
@@ -48,15 +49,7 @@ SplatPass::SplatPass(const Device& device, layout::uint falloff, bool withDepth,
 }
 
 SplatTarget SplatPass::createTarget(std::uint32_t width, std::uint32_t height) const {
-  const VkPhysicalDeviceLimits& limits = device_.limits();
-  const std::uint32_t most =
-      std::min({limits.maxImageDimension2D, limits.maxFramebufferWidth, limits.maxFramebufferHeight,
-                limits.maxViewportDimensions[0], limits.maxViewportDimensions[1]});
-  if (width > most || height > most)
-    throw MachineError(
-        fmt::format("a picture of {} × {} pixels is too large for {}, which draws at most {} × {}; "
-                    "use a smaller picture or --raster cpu",
-                    width, height, device_.name(), most, most));
+  requirePictureFits(device_, width, height);
   SplatTarget target;
   target.color = device_.createImage(width, height, kColorFormat);
   if (withDepth_) target.depth = device_.createImage(width, height, kDepthFormat);

@@ -40,6 +40,7 @@ VkDevice createLogicalDevice(VkPhysicalDevice physicalDevice, std::uint32_t queu
   auto features = structure<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
   features.pNext = &v12;
   features.features.geometryShader = features.features.independentBlend = VK_TRUE;
+  features.features.dualSrcBlend = VK_TRUE;
   features.features.fullDrawIndexUint32 = features.features.shaderInt64 = VK_TRUE;
   features.features.shaderFloat64 = shaderFloat64(physicalDevice);
 

@@ -20,6 +20,10 @@ VkPipelineColorBlendAttachmentState blendState(Blend blend) {
   const bool over = blend == Blend::PremultipliedOver;
   state.dstColorBlendFactor = state.dstAlphaBlendFactor =
       over ? VK_BLEND_FACTOR_ONE_MINUS_SRC_ALPHA : VK_BLEND_FACTOR_ONE;
+  if (blend == Blend::DualSourceOver) {
+    state.dstColorBlendFactor = VK_BLEND_FACTOR_ONE_MINUS_SRC1_COLOR;
+    state.dstAlphaBlendFactor = VK_BLEND_FACTOR_ONE_MINUS_SRC1_ALPHA;
+  }
   state.colorBlendOp = blend == Blend::Min ? VK_BLEND_OP_MIN : blend == Blend::Max ? VK_BLEND_OP_MAX : VK_BLEND_OP_ADD;
   state.alphaBlendOp = state.colorBlendOp;
   return state;

@@ -15,6 +15,7 @@ namespace mote {
 enum class Blend {
   Replace,
   PremultipliedOver,  // source + (1 − source α) · target, all four channels
+  DualSourceOver,     // index 0 + (1 − index 1) · target, channel by channel; the only target of its pipeline
   Min,                // componentwise
   Max,
   Add,

@@ -63,6 +63,7 @@ void needFeatures(VkPhysicalDevice device, std::vector<std::string>& missing) {
   };
   need(features.features.geometryShader, "geometryShader");
   need(features.features.independentBlend, "independentBlend");
+  need(features.features.dualSrcBlend, "dualSrcBlend");
   need(features.features.fullDrawIndexUint32, "fullDrawIndexUint32");
   need(features.features.shaderInt64, "shaderInt64");
   need(v12.bufferDeviceAddress, "bufferDeviceAddress");

@@ -55,4 +55,39 @@ void writePngBytes(const std::string& path, const std::vector<std::uint8_t>& rgb
   file.commit();
 }
 
+namespace {
+
+/// Inverse of the sRGB encoding (IEC 61966-2-1).
+float decodeSrgb(std::uint8_t encoded) {
+  const float e = static_cast<float>(encoded) / 255;
+  return e <= 0.04045f ? e / 12.92f : std::pow((e + 0.055f) / 1.055f, 2.4f);
+}
+
+}  // namespace
+
+Image readPng(const std::string& path, PngValues values) {
+  constexpr png_uint_32 kMost = 16384;
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  if (!png_image_begin_read_from_file(&png, path.c_str()))
+    throw InputError(path, "", "a PNG picture", png.message);
+  if (png.width > kMost || png.height > kMost) {
+    png_image_free(&png);
+    throw InputError(path, "", fmt::format("at most {0} × {0} pixels", kMost),
+                     fmt::format("{} × {}", png.width, png.height));
+  }
+  png.format = PNG_FORMAT_RGBA;
+  std::vector<std::uint8_t> bytes(PNG_IMAGE_SIZE(png));
+  if (!png_image_finish_read(&png, nullptr, bytes.data(), 0, nullptr))
+    throw InputError(path, "", "a whole PNG picture", png.message);
+  float table[256];
+  for (int i = 0; i < 256; ++i)
+    table[i] = values == PngValues::Color ? decodeSrgb(static_cast<std::uint8_t>(i)) : static_cast<float>(i) / 255;
+  Image image(static_cast<int>(png.width), static_cast<int>(png.height));
+  for (std::size_t i = 0; i < image.pixels.size(); ++i)
+    image.pixels[i] = vec4(table[bytes[4 * i]], table[bytes[4 * i + 1]], table[bytes[4 * i + 2]],
+                           static_cast<float>(bytes[4 * i + 3]) / 255);
+  return image;
+}
+
 }  // namespace mote

@@ -1,4 +1,4 @@
-// The preview: an 8-bit sRGB PNG of a linear picture.
+// PNG: the preview, an 8-bit sRGB picture of a linear one, and reading of maps.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -18,5 +18,15 @@ void writePng(const std::string& path, const Image& image, float exposure = 0);
 
 /// Writes bytes as they are: width × height × RGB, rows from the top. Throws as writePng.
 void writePngBytes(const std::string& path, const std::vector<std::uint8_t>& rgb, int width, int height);
+
+/// What the numbers of a PNG mean.
+enum class PngValues {
+  Color,  ///< sRGB: becomes linear
+  Data,   ///< a measure: value / 255 as it stands
+};
+
+/// Any PNG, with 8 bits a channel: RGB as `values` says, not premultiplied; A 1 where there is none. Throws InputError
+/// for a file that is missing, is no PNG, or is larger than 16384 × 16384.
+Image readPng(const std::string& path, PngValues values);
 
 }  // namespace mote

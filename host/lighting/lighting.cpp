@@ -133,8 +133,8 @@ std::vector<float> lineOpticalDepths(const Octree& tree, std::span<const vec3> p
 }
 
 void addInScattering(const Receivers& receivers, std::span<const float> radius, const layout::Light& light,
-                     std::span<const float> transmittance, std::span<const float> visibility,
-                     const Scattering& scattering, std::vector<vec3>& radiance) {
+                     std::span<const float> transmittance, const Scattering& scattering,
+                     std::vector<vec3>& radiance) {
   const std::size_t count = receivers.size();
   MOTE_CHECK(radius.size(), ==, count);
   MOTE_CHECK(radiance.size(), ==, count);
@@ -148,8 +148,7 @@ void addInScattering(const Receivers& receivers, std::span<const float> radius, 
                                : glm::dot(travelDirection(light, point), scattering.viewer.directionFrom(point));
       const vec3 passes = grey ? vec3(transmittance[k])
                                : vec3(transmittance[k], transmittance[count + k], transmittance[2 * count + k]);
-      const float share = scattering.phase(cosine) * (visibility.empty() ? 1.0f : visibility[k]);
-      radiance[k] += share * passes * irradiance(light, point, radius[k]);
+      radiance[k] += scattering.phase(cosine) * passes * irradiance(light, point, radius[k]);
     }
   });
 }

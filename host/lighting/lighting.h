@@ -69,11 +69,11 @@ struct Scattering {
   Viewer viewer;
 };
 
-/// Adds p(θ) · E · T · S of one light to each receiver's in-scattered radiance [W/(m² sr)].
+/// Adds p(θ) · E · T of one light to each receiver's in-scattered radiance [W/(m² sr)].
 /// `radius`: of each receiver, the least distance from the light that counts (irradiance.h). `transmittance`: one or
-/// three channels. `visibility` S: share of the light that solids let pass, 0–1, one number a receiver; empty: 1.
+/// three channels, of all that stands in the light's way.
 void addInScattering(const Receivers& receivers, std::span<const float> radius, const layout::Light& light,
-                     std::span<const float> transmittance, std::span<const float> visibility,
-                     const Scattering& scattering, std::vector<vec3>& radiance);
+                     std::span<const float> transmittance, const Scattering& scattering,
+                     std::vector<vec3>& radiance);
 
 }  // namespace mote

@@ -15,13 +15,16 @@ vec3 flush(const vec3& v) { return {flush(v.x), flush(v.y), flush(v.z)}; }
 
 }  // namespace
 
-layout::uint depthKey(const vec3& particle, const vec3& camera, float scale) {
+vec3 viewAxis(const layout::SplatCamera& camera) { return camera.orthographic != 0 ? camera.forward : vec3(0); }
+
+layout::uint depthKey(const vec3& particle, const vec3& camera, float scale, const vec3& axis) {
   const vec3 d = flush(flush(particle) - flush(camera));
   const vec3 e = d * scale;
-  const vec3 q = flush(e * e);
-  const float square = (q.x + q.y) + q.z;
-  constexpr float kGreatest = std::numeric_limits<float>::max();
-  return ~std::bit_cast<layout::uint>(square <= kGreatest ? square : kGreatest);  // bits of floats ≥ 0 ascend with them
+  const vec3 q = flush(e * (axis == vec3(0) ? e : axis));
+  const float sum = (q.x + q.y) + q.z;
+  constexpr float kLeast = std::numeric_limits<float>::min(), kGreatest = std::numeric_limits<float>::max();
+  const float s = sum >= kLeast ? std::min(sum, kGreatest) : 0.0f;
+  return ~std::bit_cast<layout::uint>(s);  // bits of floats ≥ 0 ascend with them
 }
 
 float depthKeyScale(const Bounds& centres, const vec3& camera) {
@@ -40,10 +43,11 @@ std::vector<layout::uint> sortByDepth(std::span<const layout::SplatParticle> par
                                       const layout::SplatCamera& camera, float scale) {
   // (key, index) as one number: all different, so any correct sort gives the one order, that of a stable sort.
   std::vector<std::uint64_t> pairs(particles.size());
+  const vec3 axis = viewAxis(camera);
   constexpr std::size_t kGrain = 16384;
   parallelBlocks(particles.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
-      pairs[i] = std::uint64_t{depthKey(particles[i].position, camera.position, scale)} << 32 | i;
+      pairs[i] = std::uint64_t{depthKey(particles[i].position, camera.position, scale, axis)} << 32 | i;
   });
   tbb::parallel_sort(pairs.begin(), pairs.end());
   std::vector<layout::uint> order(particles.size());

@@ -30,20 +30,29 @@ constexpr float kDepthAlpha = 1e-3f;
 /// 2 is the least that keeps the default falloff within 2 % for τ ≤ 1. splat_test measures its row through rasterize().
 constexpr float kMinSplatRadius = 2.0f;
 
-/// Camera space and image plane of a perspective camera. `fov` vertical [degrees]; `up` not parallel to the view.
+/// Camera space and image plane of a perspective camera with square pixels and everything sharp. `fov` vertical [degrees]; `up` not parallel to the view.
 /// Throws InputError where target or up leave the view undefined.
 layout::SplatCamera makeSplatCamera(const vec3& position, const vec3& target, const vec3& up, float fov, float near,
                                     float far, int width, int height, layout::uint falloff);
+
+/// The same camera with parallel rays: `height` of the picture [scene units].
+void makeOrthographic(layout::SplatCamera& camera, float height);
+/// … with pixels `aspect` times as wide as high.
+void setPixelAspect(layout::SplatCamera& camera, float aspect);
 
 /// Scene → camera space (x right, y up, z forward) and, after division by w, scene → picture ((0,0) upper left, (1,1)
 /// lower right; z 0 at near, 1 at far), for column vectors: what ExrOptions takes.
 mat4 worldToCamera(const layout::SplatCamera& camera);
 mat4 worldToNdc(const layout::SplatCamera& camera);
 
-/// Key of the sort: the bits of the squared distance to the camera, inverted, so that ascending order is back to front.
+/// The unit view axis of an orthographic camera, 0 of a perspective one: what tells depthKey() which distance counts.
+vec3 viewAxis(const layout::SplatCamera& camera);
+
+/// Key of the sort: the bits of the squared distance to the camera, inverted, so that ascending order is back to front;
+/// with a view axis, of the depth along it (0 for what lies behind).
 /// `scale` is a power of two near 1 / (greatest distance): neither tiny nor huge scenes lose digits. The operations are
 /// those of layout/sort.h, so it is bit-equal to depth_key.comp.
-layout::uint depthKey(const vec3& particle, const vec3& camera, float scale);
+layout::uint depthKey(const vec3& particle, const vec3& camera, float scale, const vec3& axis = vec3(0));
 /// The power of two that brings the farthest corner of `centres` to a distance in [½, 1); 1 where there is none.
 float depthKeyScale(const Bounds& centres, const vec3& camera);
 
@@ -51,7 +60,7 @@ float depthKeyScale(const Bounds& centres, const vec3& camera);
 std::vector<layout::uint> sortByDepth(std::span<const layout::SplatParticle> particles,
                                       const layout::SplatCamera& camera, float scale);
 
-/// Draws the particles in the order given (indices into `particles`), each α·radiance *over* what is there. Results do
+/// Draws the particles of a perspective camera with square pixels in the order given (indices into `particles`), each α·radiance *over* what is there. Results do
 /// not depend on the number of threads nor on the CPU's instruction set, bit for bit. Memory: the picture and at most
 /// 150 MB. A million splats of 4 pixels' radius take about half a second of one core with AVX-512,
 /// spread over all cores.

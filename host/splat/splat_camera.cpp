@@ -40,6 +40,17 @@ layout::SplatCamera makeSplatCamera(const vec3& position, const vec3& target, co
   return camera;
 }
 
+void makeOrthographic(layout::SplatCamera& camera, float height) {
+  camera.orthographic = 1;
+  camera.pixelSize = height / camera.imageSize.y;
+  camera.halfExtent = 0.5f * camera.pixelSize * vec2(camera.imageSize.x * camera.pixelAspect, camera.imageSize.y);
+}
+
+void setPixelAspect(layout::SplatCamera& camera, float aspect) {
+  camera.pixelAspect = aspect;
+  camera.halfExtent.x = 0.5f * camera.pixelSize * (camera.imageSize.x * aspect);
+}
+
 mat4 worldToCamera(const layout::SplatCamera& camera) {
   const dvec3 axes[] = {camera.right, camera.up, camera.forward};
   mat4 m(1);
@@ -55,8 +66,13 @@ mat4 worldToNdc(const layout::SplatCamera& camera) {
   mat4 projection(0);
   projection[0][0] = 0.5f / camera.halfExtent.x;
   projection[1][1] = -0.5f / camera.halfExtent.y;
-  projection[2] = vec4(0.5f, 0.5f, camera.far / (camera.far - camera.near), 1);
-  projection[3][2] = -camera.near * projection[2][2];
+  if (camera.orthographic != 0) {  // w = 1
+    projection[2][2] = 1 / (camera.far - camera.near);
+    projection[3] = vec4(0.5f, 0.5f, -camera.near * projection[2][2], 1);
+  } else {
+    projection[2] = vec4(0.5f, 0.5f, camera.far / (camera.far - camera.near), 1);
+    projection[3][2] = -camera.near * projection[2][2];
+  }
   return projection * worldToCamera(camera);
 }
 

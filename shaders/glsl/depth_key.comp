@@ -19,8 +19,10 @@ void main() {
   // `precise`: no fused multiply-add, no reordering.
   precise const vec3 difference = flush(position) - flush(params.camera);
   precise const vec3 scaled = flush(difference) * params.scale;
-  precise const vec3 squared = scaled * scaled;
-  const vec3 q = flush(squared);
+  precise const vec3 weighted = scaled * (params.axis == vec3(0) ? scaled : params.axis);
+  const vec3 q = flush(weighted);
   precise const float sum = (q.x + q.y) + q.z;
-  params.pairs.at[k] = SortPair(k, ~floatBitsToUint(min(sum, kGreatest)));
+  // Not max(): of the two zeros it may give either.
+  const float s = sum >= kLeastNormal ? min(sum, kGreatest) : 0.0;
+  params.pairs.at[k] = SortPair(k, ~floatBitsToUint(s));
 }

@@ -8,8 +8,9 @@
 #include "types.h"
 
 // The key of a particle at p, camera at c: flush(x) = |x| < 2⁻¹²⁶ ? 0 : x, since devices may or may not keep denormals;
-//   d = flush(flush(p) − flush(c)), e = d · scale, q = flush(e · e), s = (q.x + q.y) + q.z, every operation rounded once,
-//   key = ~bits(min(s, greatest float)).
+//   d = flush(flush(p) − flush(c)), e = d · scale, q = flush(e · e), s = flush((q.x + q.y) + q.z), every operation
+//   rounded once, key = ~bits(min(max(s, 0), greatest float)).
+// Where the rays are parallel, depth along the view axis decides: q = flush(e · axis); what lies behind has s = 0.
 MOTE_LAYOUT_BEGIN
 struct SortPair {
   uint index;  // low word: breaks ties
@@ -26,15 +27,16 @@ struct DepthKeyParams {
   MOTE_ADDRESS(SortPairBuffer) pairs;  // out
   vec3 camera;                         // [scene units]
   float scale;                         // power of two near 1 / (greatest distance)
+  vec3 axis;                           // orthographic: unit view axis; perspective: 0
   uint count;
-  uint pad;                            // keeps the size a multiple of 8
 };
 MOTE_ASSERT_OFFSET(DepthKeyParams, particles, 0);
 MOTE_ASSERT_OFFSET(DepthKeyParams, pairs, 8);
 MOTE_ASSERT_OFFSET(DepthKeyParams, camera, 16);
 MOTE_ASSERT_OFFSET(DepthKeyParams, scale, 28);
-MOTE_ASSERT_OFFSET(DepthKeyParams, count, 32);
-MOTE_ASSERT_SIZE(DepthKeyParams, 40);
+MOTE_ASSERT_OFFSET(DepthKeyParams, axis, 32);
+MOTE_ASSERT_OFFSET(DepthKeyParams, count, 44);
+MOTE_ASSERT_SIZE(DepthKeyParams, 48);
 
 // What a pipeline of bitonic_merge.comp does with the 2^m pairs of an invocation.
 MOTE_CONST uint kSortBlocks = 0u;    // sorts them (stride 1)

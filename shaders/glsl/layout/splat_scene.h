@@ -11,6 +11,8 @@
 MOTE_LAYOUT_BEGIN
 MOTE_BUFFER(Vec3Buffer, vec3)
 
+MOTE_CONST float kPixelLeftOut = -1.0f;  // in place of a surface's depth: nothing is drawn at this pixel
+
 struct SplatScene {
   MOTE_ADDRESS(SplatParticleBuffer) particles;
   MOTE_ADDRESS(Vec3Buffer) extinction;     // factor on the optical depth of each colour; 0: 1 for all

@@ -17,8 +17,9 @@ bool sampleSplat(SplatScene scene, FullFootprint f, uint index, vec2 at, out Spl
   const SplatParticle particle = scene.particles.at[index];
   precise float weight = f.peakScale * c.profile;
   if (uint64_t(scene.solidDepth) != 0) {
-    const uint pixel = uint(at.y) * uint(scene.camera.imageSize.x) + uint(at.x);
-    weight *= shareBefore(f, c, scene.solidDepth.at[pixel]);
+    const float surface = scene.solidDepth.at[uint(at.y) * uint(scene.camera.imageSize.x) + uint(at.x)];
+    if (surface == kPixelLeftOut) return false;
+    weight *= shareBefore(f, c, surface);
   }
   precise float opacity = f.opacity;
   const vec2 point = spritePoint(f, c);

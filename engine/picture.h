@@ -1,0 +1,25 @@
+// A frame's picture: splats and solids together, with every layer that was asked for.
+#pragma once
+#include <functional>
+#include <vector>
+
+#include "engine/lighting.h"
+#include "engine/rasterizer.h"
+#include "host/image/image.h"
+#include "host/solids/surfaces.h"
+
+namespace mote {
+
+/// Draws the medium before, beside and between the surfaces, lights these, and lays both over each other, each with its
+/// share of the pixel:
+///   radiance Σ coverage · (medium before the surface + (1 − its α) · surface);   α likewise, holdouts counting as 0
+///   Z                the nearest of the medium's and of shaded surfaces' depths
+///   optical_depth    of the medium up to the surface, weighted by coverage
+///   velocity         of medium and shaded surfaces, weighted by what each adds to α
+///   shadow.<light>   T · S at the surfaces, weighted by coverage; 1 where there is none. Holdouts have it as well
+///   light.<name>.*   the picture by one light alone; `emission.*` what the particles give out. Their sum is the picture
+/// `lit` is taken apart on the way. `sources` serve the surfaces; `seconds` get "solids".
+Image makePicture(const Frame& frame, const Scene& scene, const SplatSet& set, LitParticles lit,
+                  const Surfaces& surfaces, Rasterizer& rasterizer, const ShadowSources& sources);
+
+}  // namespace mote

@@ -1,0 +1,138 @@
+#include "engine/splats.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <limits>
+
+#include "host/core/error.h"
+#include "host/core/parallel.h"
+#include "host/image/exr.h"
+#include "host/image/png.h"
+#include "host/scene/camera_path.h"
+#include "host/scene/missing_file.h"
+#include "host/splat/splat.h"
+
+namespace mote {
+namespace {
+
+constexpr std::size_t kBlock = 1 << 14;
+
+layout::SplatCamera cameraAtFrame(const Scene& scene, double frame, layout::uint falloff) {
+  const Camera camera = cameraAt(scene.camera, frame);
+  const Output& output = scene.output;
+  layout::SplatCamera result = makeSplatCamera(camera.position, camera.target, camera.up, camera.fov, camera.near,
+                                               camera.far, output.size.x, output.size.y, falloff);
+  if (camera.projection == Projection::Orthographic) makeOrthographic(result, camera.height);
+  setPixelAspect(result, output.pixelAspect);
+  result.apertureRadius = camera.apertureRadius;
+  result.focusDistance = focusDistanceOf(camera);
+  return result;
+}
+
+Image readSprite(const Scene& scene, const char* key, const std::string& path, PngValues values) {
+  if (!std::filesystem::exists(path))
+    throw InputError(scene.path, fmt::format("/view/{}", key), "a PNG or EXR picture",
+                     fmt::format("{}, which does not exist", path), nearestNames(path, path));
+  return std::filesystem::path(path).extension() == ".exr" ? readExr(path) : readPng(path, values);
+}
+
+void readSprites(const Scene& scene, SplatSet& set) {
+  const View& view = scene.view;
+  if (!view.spriteColor.empty()) {
+    Image map = readSprite(scene, "sprite_color", view.spriteColor, PngValues::Color);
+    set.scene.spriteColorWidth = static_cast<layout::uint>(map.width);
+    set.scene.spriteColorHeight = static_cast<layout::uint>(map.height);
+    set.spriteColor = std::move(map.pixels);
+  }
+  if (!view.spriteOpacity.empty()) {
+    const Image map = readSprite(scene, "sprite_opacity", view.spriteOpacity, PngValues::Data);
+    set.scene.spriteOpacityWidth = static_cast<layout::uint>(map.width);
+    set.scene.spriteOpacityHeight = static_cast<layout::uint>(map.height);
+    const bool hasAlpha = std::any_of(map.pixels.begin(), map.pixels.end(), [](const vec4& p) { return p.w < 1; });
+    for (const vec4& p : map.pixels) {
+      const float value = hasAlpha ? p.w : (p.x + p.y + p.z) / 3;
+      set.spriteOpacity.push_back(value > 0 ? std::min(value, 1.0f) : 0.0f);
+    }
+  }
+}
+
+/// A cross-section spread over a disc s times as wide is 1/s² of it in the middle; in mode peak the peak stays.
+float spread(const Scene& scene) {
+  const float s = scene.view.radiusScale;
+  return scene.medium.densityMode == DensityMode::CrossSection ? 1 / (s * s) : 1.0f;
+}
+
+vec3 albedoOf(const ParticleSet& particles, const Medium& medium, std::size_t i) {
+  const vec3 own = particles.color.empty() ? particles.uniformColor : particles.color[i];
+  return singleScatteringAlbedo(medium.albedo * own, particles.absorption.empty() ? nullptr : &particles.absorption[i]);
+}
+
+/// One of a set's arrays: get(i) for the particle i of the input, in the order of the receivers.
+template <class Get>
+std::vector<vec3> inReceiverOrder(const Frame& frame, const Get& get) {
+  const std::vector<std::uint32_t>& source = frame.density.source();
+  std::vector<vec3> result(source.size());
+  parallelBlocks(source.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) result[k] = get(source[k]);
+  });
+  return result;
+}
+
+}  // namespace
+
+SplatSet blankSplats(const Scene& scene, int number, layout::uint falloff) {
+  SplatSet set;
+  layout::SplatScene& s = set.scene;
+  const Camera& camera = scene.camera;
+  const double fps = scene.frames.fps;
+  s.camera = cameraAtFrame(scene, number, falloff);
+  s.openTime = camera.shutter.x, s.closeTime = camera.shutter.y;
+  s.halfFrame = static_cast<float>(0.5 / fps);
+  s.open = cameraAtFrame(scene, number + camera.shutter.x * fps, falloff);
+  s.close = cameraAtFrame(scene, number + camera.shutter.y * fps, falloff);
+  s.before = cameraAtFrame(scene, number - 0.5, falloff);
+  s.after = cameraAtFrame(scene, number + 0.5, falloff);
+  readSprites(scene, set);
+  return set;
+}
+
+SplatSet splatSet(const Frame& frame, const Scene& scene, const std::vector<vec3>& inScattered) {
+  const ParticleSet& particles = frame.particles;
+  const bool grey = frame.extinction.grey();
+  const float peakScale = spread(scene) * (grey ? frame.extinction.uniform.x : 1.0f);
+  const Receivers receivers = frame.density.receivers();
+  const std::vector<std::uint32_t>& source = frame.density.source();
+  SplatSet set = frame.blank;
+  set.particles.resize(receivers.size());
+  parallelBlocks(set.particles.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const std::size_t i = source[k];
+      set.particles[k] = {.position = receivers.position(k),
+                          .radius = particles.radius[i] * scene.view.radiusScale,
+                          .radiance = albedoOf(particles, scene.medium, i) * inScattered[k],
+                          .peak = std::min(frame.peak[i] * peakScale, std::numeric_limits<float>::max())};
+    }
+  });
+  if (!grey) set.extinction = inReceiverOrder(frame, [&](std::size_t i) { return frame.extinction.of(i); });
+  const float emissionScale = scene.medium.emissionScale * spread(scene);
+  if (!particles.emission.empty() && emissionScale > 0)
+    set.emission = inReceiverOrder(frame, [&](std::size_t i) { return particles.emission[i] * emissionScale; });
+  const bool open = set.scene.openTime != set.scene.closeTime;
+  if (!particles.velocity.empty() && (open || scene.output.velocity))
+    set.velocity = inReceiverOrder(frame, [&](std::size_t i) { return particles.velocity[i]; });
+  set.scene.moving = open && (!set.velocity.empty() || !scene.camera.keys.empty()) ? 1 : 0;
+  return set;
+}
+
+std::vector<layout::SplatParticle> relit(const SplatSet& set, const Frame& frame, const Scene& scene,
+                                         const std::vector<vec3>& inScattered) {
+  const std::vector<std::uint32_t>& source = frame.density.source();
+  std::vector<layout::SplatParticle> particles = set.particles;
+  parallelBlocks(particles.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k)
+      particles[k].radiance = albedoOf(frame.particles, scene.medium, source[k]) * inScattered[k];
+  });
+  return particles;
+}
+
+}  // namespace mote

@@ -1,0 +1,101 @@
+// Splats sorted into the tiles of a picture: each tile is then drawn by one thread from its own list, in drawing order,
+// so that the number of threads cannot change the picture.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "host/core/parallel.h"
+#include "host/splat/tile_kernel.h"
+
+namespace mote {
+
+/// (Tile, splat) pairs that are binned at once, 4 bytes each; results do not depend on it.
+constexpr std::size_t kMaxPairs = std::size_t{1} << 25;
+
+/// The grid of tiles over a picture. A splat is anything with a pixel rectangle [left, right) × [top, bottom).
+struct Tiling {
+  std::size_t columns, rows;
+  Tiling(int width, int height)
+      : columns((static_cast<std::size_t>(width) + kTileWidth - 1) / kTileWidth),
+        rows((static_cast<std::size_t>(height) + kTileHeight - 1) / kTileHeight) {}
+  std::size_t count() const { return columns * rows; }
+  int left(std::size_t tile) const { return static_cast<int>(tile % columns) * kTileWidth; }
+  int top(std::size_t tile) const { return static_cast<int>(tile / columns) * kTileHeight; }
+
+  /// Calls body(tile) for every tile that the splat's rectangle touches.
+  template <class S, class Body>
+  void forEach(const S& s, const Body& body) const {
+    if (s.left >= s.right || s.top >= s.bottom) return;
+    for (std::size_t row = s.top / kTileHeight; row <= std::size_t(s.bottom - 1) / kTileHeight; ++row)
+      for (std::size_t column = s.left / kTileWidth; column <= std::size_t(s.right - 1) / kTileWidth; ++column)
+        body(row * columns + column);
+  }
+  template <class S>
+  std::size_t touched(const S& s) const {
+    if (s.left >= s.right || s.top >= s.bottom) return 0;
+    return std::size_t((s.right - 1) / kTileWidth - s.left / kTileWidth + 1) *
+           std::size_t((s.bottom - 1) / kTileHeight - s.top / kTileHeight + 1);
+  }
+};
+
+/// The splats of each tile, in drawing order.
+struct Bins {
+  std::vector<std::size_t> first;    ///< a tile's first item; one more entry ends the last
+  std::vector<std::uint32_t> items;  ///< indices into the splats
+};
+
+/// Counting sort of the run [begin, end) by tile: blocks count, one scan gives every (tile, block) its place, blocks
+/// fill.
+template <class S>
+void fillBins(const std::vector<S>& splats, std::size_t begin, std::size_t end, const Tiling& tiling, Bins& bins) {
+  constexpr std::size_t kBinBlocks = 64;  // that are binned side by side; each needs a counter for every tile
+  const std::size_t tiles = tiling.count(), grain = (end - begin + kBinBlocks - 1) / kBinBlocks;
+  std::vector<std::uint32_t> places(kBinBlocks * tiles, 0);
+  parallelBlocks(end - begin, grain, [&](std::size_t from, std::size_t to) {
+    std::uint32_t* mine = places.data() + from / grain * tiles;
+    for (std::size_t i = from; i < to; ++i) tiling.forEach(splats[begin + i], [&](std::size_t tile) { ++mine[tile]; });
+  });
+  bins.first.resize(tiles + 1);
+  std::uint32_t place = 0;  // the pairs of a run fit: one splat touches fewer than 2¹⁸ tiles, a run else kMaxPairs
+  for (std::size_t tile = 0; tile < tiles; ++tile) {
+    bins.first[tile] = place;
+    for (std::size_t block = 0; block < kBinBlocks; ++block) {
+      const std::uint32_t count = places[block * tiles + tile];
+      places[block * tiles + tile] = place;
+      place += count;
+    }
+  }
+  bins.first[tiles] = place;
+  bins.items.resize(place);
+  parallelBlocks(end - begin, grain, [&](std::size_t from, std::size_t to) {
+    std::uint32_t* mine = places.data() + from / grain * tiles;
+    for (std::size_t i = from; i < to; ++i)
+      tiling.forEach(splats[begin + i],
+                     [&](std::size_t tile) { bins.items[mine[tile]++] = static_cast<std::uint32_t>(begin + i); });
+  });
+}
+
+/// Bins all splats in runs of at most kMaxPairs pairs and calls drawTile(tile, items, count) for each tile that has
+/// some, tiles side by side, runs one after the other.
+template <class S, class DrawTile>
+void forEachTile(const std::vector<S>& splats, const Tiling& tiling, Bins& bins, const DrawTile& drawTile) {
+  for (std::size_t begin = 0, end; begin < splats.size(); begin = end) {
+    std::size_t pairs = 0;
+    for (end = begin; end < splats.size(); ++end) {
+      pairs += tiling.touched(splats[end]);
+      if (pairs > kMaxPairs && end > begin) break;
+    }
+    fillBins(splats, begin, end, tiling, bins);
+    tbb::parallel_for(std::size_t{0}, tiling.count(), [&](std::size_t tile) {
+      const std::size_t first = bins.first[tile], count = bins.first[tile + 1] - first;
+      if (count > 0) drawTile(tile, bins.items.data() + first, count);
+    });
+  }
+}
+
+/// Rounds x ≥ 0: the first pixel whose centre is not before x, or one past the last that is not after. Ties do not
+/// matter, footprints have slack. (std::floor is a call without SSE4.1.)
+inline std::uint16_t nearestPixel(float x) { return static_cast<std::uint16_t>(static_cast<int>(x + 0.5f)); }
+
+}  // namespace mote
