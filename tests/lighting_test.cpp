@@ -88,6 +88,26 @@ TEST(LightingOracle, AgreesForEqualRadiiAndDenseNeighbourhoods) {
                 1e-4);
 }
 
+/// A packet may start on both sides of a light among its receivers: what lies around those behind the light counts too.
+TEST(LightingOracle, AgreesForLightsAmongTheParticles) {
+  const Cloud cloud = ballCloud(20000, 16, 0.08, 0.09);
+  const Octree tree = cloud.tree(layout::kFalloffSmooth, true, 1e-3);
+  std::size_t compared = 0;
+  for (int k = 0; k < 20; ++k) {
+    const vec3 place = cloud.position[static_cast<std::size_t>(k) * 900];
+    const layout::Light light = pointLight(k % 2 == 0 ? place : place + vec3(0.02f, -0.01f, 0.015f));
+    const layout::uint endpoint = kEndpoints[k / 2 % 2];
+    const std::vector<float> depths = opticalDepths(tree, light, {layout::kFalloffSmooth, endpoint, 0});
+    for (std::size_t i = 0; i < depths.size(); ++i) {
+      if (glm::distance(tree.position(i), light.position) > 0.25f || tree.position(i) == light.position) continue;
+      const double expected = oracleOpticalDepth(tree, i, light, layout::kFalloffSmooth, endpoint);
+      ASSERT_NEAR(depths[i], expected, 1e-4 * expected + 1e-5) << "light " << k << " slot " << i;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 2000u);
+}
+
 TEST(Lighting, ScalarAndEveryInstructionSetGiveTheSameBits) {
   const Cloud cloud = ballCloud(20000, 13, 0.01, 0.1);
   const layout::Light light = pointLight({0.5f, 0.5f, 2});

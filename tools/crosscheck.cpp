@@ -45,6 +45,7 @@ Side run(const Frame& frame, const Scene& scene, Backends backends, Gpu* gpu) {
 struct LightDifference {
   std::string name;
   double worst = 0, mean = 0;
+  double transmittance = 0;  ///< mean of the host's
   std::size_t particle = 0;  ///< input index of the worst
 };
 
@@ -54,6 +55,7 @@ LightDifference compareLight(const Frame& frame, std::size_t light, const Side& 
   for (std::size_t slot = 0; slot < a.size(); ++slot) {
     double delta = std::abs(double(a[slot]) - double(b[slot]));
     if (!std::isfinite(delta)) delta = std::numeric_limits<double>::infinity();  // not a number on either side
+    difference.transmittance += a[slot] / static_cast<double>(a.size());
     difference.mean += delta / static_cast<double>(a.size());
     if (delta > difference.worst) difference.worst = delta, difference.particle = frame.density.source()[slot % frame.density.source().size()];
   }
@@ -66,9 +68,16 @@ Json lightsReport(const std::vector<LightDifference>& lights, double limit) {
     report.push_back({{"light", light.name},
                       {"worst_delta_transmittance", light.worst},
                       {"mean_delta_transmittance", light.mean},
+                      {"mean_transmittance", light.transmittance},
                       {"particle", light.particle},
                       {"limit", limit}});
   return report;
+}
+
+double meanAlpha(const Image& image) {
+  double sum = 0;
+  for (const vec4& pixel : image.pixels) sum += pixel.a;
+  return sum / static_cast<double>(image.pixels.size());
 }
 
 /// Greatest |difference| of the depth layers where both have one; infinite where only one has.
@@ -112,6 +121,8 @@ void crosscheck(const CrosscheckOptions& options, const CommonOptions& common, i
              pictures ? "ok" : "DIFFERS");
   same = same && sorted && pictures;
   if (!options.report.empty()) {
+    Json pictureReport = Json::parse(differenceJson(picture));
+    pictureReport["mean_alpha"] = meanAlpha(host.image);
     const Json report = {{"version", MOTE_VERSION},
                          {"scene", options.scene.scene},
                          {"device", gpu->device().name()},
@@ -119,7 +130,7 @@ void crosscheck(const CrosscheckOptions& options, const CommonOptions& common, i
                          {"cutoff", scene.lighting.cutoff},
                          {"lights", lightsReport(lights, limit)},
                          {"sort_identical", sorted},
-                         {"picture", Json::parse(differenceJson(picture))},
+                         {"picture", std::move(pictureReport)},
                          {"depth_worst", depthDifference(host.image, device.image)},
                          {"seconds", {{"cpu", host.stats.seconds}, {"gpu", device.stats.seconds}}},
                          {"passed", same}};

@@ -30,7 +30,6 @@ void setAxis(Packet& packet, const vec3& origin, const vec3& toLight, bool infin
   const double length = glm::length(dvec3(toLight));
   packet.axisDirection = length > 0 ? vec3(dvec3(toLight) / length) : vec3(1, 0, 0);
   packet.axisLength = infinite ? kInfinity : static_cast<float>(length);
-  packet.lastStep = infinite ? kInfinity : 1.0f;
   for (int axis = 0; axis < 3; ++axis) packet.inverseStep[axis] = safeInverse(toLight[axis]);
 }
 
@@ -57,6 +56,10 @@ void setShaft(Packet& packet, const PacketRules& rules) {
   packet.firstStep = std::isinf(packet.axisLength) ? -packet.behind
                      : packet.axisLength > 0       ? -packet.behind / packet.axisLength
                                                    : -kInfinity;
+  // Rays may also start beyond a light that stands among the receivers.
+  packet.lastStep = std::isinf(packet.axisLength) ? kInfinity
+                    : packet.axisLength > 0      ? std::max(1.0f, packet.ahead / packet.axisLength)
+                                                 : kInfinity;
 }
 
 }  // namespace

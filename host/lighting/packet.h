@@ -39,7 +39,7 @@ struct Packet {
   float axisLength;    ///< +∞ for directional
   vec3 inverseStep;    ///< 1 / (axis vector), the vector to the light or, for directional, the unit direction
   float firstStep;     ///< start of the segment in that parameter, ≤ 0: the hindmost origin
-  float lastStep;      ///< … and its end: 1, or +∞
+  float lastStep;      ///< … and its end: 1 (the light), farther where a ray starts beyond the light, or +∞
   vec3 slabLow;        ///< axisOrigin + spread: a slab's lower side, moved out by what the rays stray from the axis …
   vec3 slabHigh;       ///< … axisOrigin − spread: its upper side
   float tube;          ///< … and this near to the axis line

@@ -148,7 +148,7 @@ const Feature kFeatures[] = {
 };
 
 INSTANTIATE_TEST_SUITE_P(Scenes, CrosscheckFeature, testing::ValuesIn(kFeatures),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace
 }  // namespace mote::test

@@ -30,25 +30,31 @@ inline double oracleShare(const dvec3& offset, const dvec3& direction, double le
   return share * oracleCap(t / halfChord) * oracleCap((length - t) / halfChord);
 }
 
-/// Optical depth of every slot toward the light, before shadowDensity.
+/// Optical depth of one slot toward the light, before shadowDensity.
+inline double oracleOpticalDepth(const Octree& tree, std::size_t slot, const layout::Light& light, layout::uint falloff,
+                                 layout::uint endpoint) {
+  const dvec3 origin(tree.position(slot));
+  dvec3 direction = -dvec3(light.direction);
+  double length = INFINITY;
+  if (light.type != layout::kLightDirectional) {
+    direction = dvec3(light.position) - origin;
+    length = glm::length(direction);
+    if (length == 0) return 0;  // nothing lies between a light and a particle at the same place
+    direction /= length;
+  }
+  double depth = 0;
+  for (std::size_t j = 0; j < tree.particleCount(); ++j)
+    if (j != slot)
+      depth += tree.peak[j] * oracleShare(dvec3(tree.position(j)) - origin, direction, length, tree.radius[j], falloff,
+                                          endpoint);
+  return depth;
+}
+
+/// … of every slot.
 inline std::vector<double> oracleOpticalDepths(const Octree& tree, const layout::Light& light, layout::uint falloff,
                                                layout::uint endpoint) {
-  std::vector<double> depths(tree.particleCount(), 0.0);
-  for (std::size_t i = 0; i < depths.size(); ++i) {
-    const dvec3 origin(tree.position(i));
-    dvec3 direction = -dvec3(light.direction);
-    double length = INFINITY;
-    if (light.type != layout::kLightDirectional) {
-      direction = dvec3(light.position) - origin;
-      length = glm::length(direction);
-      if (length == 0) continue;  // nothing lies between a light and a particle at the same place
-      direction /= length;
-    }
-    for (std::size_t j = 0; j < depths.size(); ++j)
-      if (j != i)
-        depths[i] += tree.peak[j] * oracleShare(dvec3(tree.position(j)) - origin, direction, length, tree.radius[j],
-                                                falloff, endpoint);
-  }
+  std::vector<double> depths(tree.particleCount());
+  for (std::size_t i = 0; i < depths.size(); ++i) depths[i] = oracleOpticalDepth(tree, i, light, falloff, endpoint);
   return depths;
 }
 
