@@ -53,13 +53,32 @@ TEST(Mesh, ReadsObjFilesWithQuadsAndWithout) {
   const Mesh spot = sharedMesh("spot.obj");
   EXPECT_EQ(spot.triangles.size(), 5856u);
   expectBounds(spot, {-0.47155f, -0.73678f, -0.66891f}, {0.47155f, 0.95365f, 1.049f}, 1e-5f);  // the file's digits
-  EXPECT_TRUE(spot.normal.empty());
+  ASSERT_EQ(spot.normal.size(), spot.position.size());  // smooth ones were made
   const Mesh suzanne = sharedMesh("suzanne.obj");
   EXPECT_GT(suzanne.triangles.size(), 900u);  // 500 faces, nearly all of them quads
   expectBounds(suzanne, {-3.8613f, 0.26731f, 3.2523f}, {-1.1269f, 2.2361f, 4.9555f}, 1e-4f);
   ASSERT_EQ(suzanne.normal.size(), suzanne.position.size());
   for (const auto& triangle : suzanne.triangles)
     for (const std::uint32_t corner : triangle) EXPECT_NEAR(glm::length(suzanne.normal[corner]), 1, 1e-6);
+}
+
+/// Corners that the file shares between faces at right angles do not make the faces round.
+TEST(Mesh, MakesNormalsThatKeepSharpEdges) {
+  const test::TempFolder folder;
+  test::writeBytes(folder.file("cube.ply"),
+                   "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n"
+                   "element face 6\nproperty list uchar int vertex_indices\nend_header\n"
+                   "-1 -1 -1\n1 -1 -1\n1 1 -1\n-1 1 -1\n-1 -1 1\n1 -1 1\n1 1 1\n-1 1 1\n"
+                   "4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n");
+  Solid cubeSolid;
+  cubeSolid.file = folder.file("cube.ply");
+  const Mesh cube = loadMesh(cubeSolid, 1);
+  ASSERT_EQ(cube.triangles.size(), 12u);
+  for (const auto& [a, b, c] : cube.triangles) {
+    const vec3 face = glm::normalize(glm::cross(cube.position[b] - cube.position[a], cube.position[c] - cube.position[a]));
+    for (const std::uint32_t corner : {a, b, c})
+      EXPECT_LE(glm::length(cube.normal[corner] - face), 1e-5f);
+  }
 }
 
 TEST(Mesh, AppliesTheNodesOfGltf) {

@@ -9,6 +9,9 @@
 #include <cmath>
 #include <filesystem>
 #include <glm/gtc/matrix_transform.hpp>
+#include <algorithm>
+#include <numeric>
+#include <tuple>
 #include <limits>
 
 #include "host/core/error.h"
@@ -88,11 +91,48 @@ void addNode(const aiScene& scene, const aiNode& node, const dmat4& parent, Mesh
   for (unsigned i = 0; i < node.mNumChildren; ++i) addNode(scene, *node.mChildren[i], transform, mesh, leftOut);
 }
 
-/// Triangles that lost their normals' file have none: a zero normal is no normal.
-void dropNormalsIfNone(Mesh& mesh) {
-  for (const vec3& normal : mesh.normal)
-    if (normal != vec3(0)) return;
-  mesh.normal.clear();
+bool hasNormals(const Mesh& mesh) {
+  return std::any_of(mesh.normal.begin(), mesh.normal.end(), [](const vec3& normal) { return normal != vec3(0); });
+}
+
+/// Normals for a mesh that came without: at each corner the mean of those faces around it, weighted by their angles
+/// there, that make less than 45° with the corner's own; what is sharper stays sharp. Splits the corners that triangles
+/// share. (Assimp's own step rounds the edges of files whose faces share corners, PLY for one.)
+void makeNormals(Mesh& mesh) {
+  constexpr float kCreaseCosine = 0.70710678f;
+  constexpr std::size_t kMostFaces = 512;  // around one corner; beyond that it stays flat, else time would be square
+  const std::size_t count = 3 * mesh.triangles.size();
+  std::vector<vec3> position(count), face(count);
+  std::vector<float> angle(count);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const layout::Triangle triangle = mesh.triangle(t);
+    const dvec3 corners[] = {triangle.a, triangle.b, triangle.c};
+    const vec3 normal(glm::normalize(glm::cross(corners[1] - corners[0], corners[2] - corners[0])));
+    for (std::size_t k = 0; k < 3; ++k) {
+      const dvec3 to = glm::normalize(corners[(k + 1) % 3] - corners[k]);
+      const dvec3 from = glm::normalize(corners[(k + 2) % 3] - corners[k]);
+      position[3 * t + k] = vec3(corners[k]), face[3 * t + k] = normal;
+      angle[3 * t + k] = static_cast<float>(std::acos(glm::clamp(glm::dot(to, from), -1.0, 1.0)));
+    }
+    const auto first = static_cast<std::uint32_t>(3 * t);
+    mesh.triangles[t] = {first, first + 1, first + 2};
+  }
+  std::vector<std::uint32_t> order(count);
+  std::iota(order.begin(), order.end(), 0u);
+  const auto key = [&](std::uint32_t i) { return std::tuple(position[i].x, position[i].y, position[i].z, i); };
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
+  mesh.normal = face;
+  for (std::size_t begin = 0, end; begin < count; begin = end) {
+    for (end = begin + 1; end < count && position[order[end]] == position[order[begin]];) ++end;
+    if (end - begin > kMostFaces) continue;
+    for (std::size_t a = begin; a < end; ++a) {
+      vec3 sum(0);
+      for (std::size_t b = begin; b < end; ++b)
+        if (glm::dot(face[order[a]], face[order[b]]) > kCreaseCosine) sum += angle[order[b]] * face[order[b]];
+      if (glm::length(sum) > 0) mesh.normal[order[a]] = glm::normalize(sum);
+    }
+  }
+  mesh.position = std::move(position);
 }
 
 void checkFile(const Solid& solid, const std::string& path) {
@@ -135,7 +175,7 @@ Mesh loadMesh(const Solid& solid, int frame) {
   if (dropped > 0)
     logWarning(fmt::format("{}: {} triangles without area and {} not finite were left out of {}", path,
                            leftOut.degenerate, leftOut.notFinite, dropped + mesh.triangles.size()));
-  dropNormalsIfNone(mesh);
+  if (!hasNormals(mesh)) makeNormals(mesh);
   return mesh;
 }
 

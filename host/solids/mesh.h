@@ -12,7 +12,7 @@ namespace mote {
 
 struct Mesh {
   std::vector<vec3> position;  ///< of the corners [scene units]; corners at one place in the file are bit-equal here
-  std::vector<vec3> normal;    ///< unit vertex normals; empty where the file has none
+  std::vector<vec3> normal;    ///< unit, at each position; 0 where the file has some but not here
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< indices into `position`; finite, none without area
 
   Bounds bounds() const;
@@ -25,6 +25,7 @@ struct Mesh {
 /// Reads the file of `frame` (#### in the name), with the transforms of the nodes that it stands under and then the
 /// solid's own: scale, rotate about x, y and z, translate. Polygons become triangles; lines and points are passed over.
 /// Triangles without area or with a corner that is not finite are left out, with one warning that counts them.
+/// A file without normals gets smooth ones, with its edges of more than 45° kept sharp.
 /// Throws InputError for a missing file (with the nearest names), a file that is no mesh, and one without triangles.
 Mesh loadMesh(const Solid& solid, int frame);
 

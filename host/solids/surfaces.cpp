@@ -24,6 +24,7 @@ struct Hit {
   std::uint32_t solid, triangle;
   float depth;
   vec3 point, face, normal;  ///< geometric and shading normal, both toward the camera
+  vec3 start;                ///< of shadow rays: the point, or above it where the smooth surface bulges
 };
 
 /// The rays of one surface in a pixel, as indices into the pixel's hits.
@@ -82,17 +83,29 @@ class Tracer {
                                                  dvec3(mesh.position[c]) - dvec3(mesh.position[a]))));
     if (glm::dot(result.face, direction) > 0) result.face = -result.face;
     result.normal = result.face;
+    result.start = result.point;
     if (!mesh.normal.empty()) {
       const vec3 smooth = mesh.normal[a] * wa + mesh.normal[b] * wb + mesh.normal[c] * wc;
       const float length = glm::length(smooth);
-      if (length > 0) result.normal = glm::dot(smooth, result.face) < 0 ? -smooth / length : smooth / length;
+      if (length > 0) {
+        const float side = glm::dot(smooth, result.face) < 0 ? -1.0f : 1.0f;
+        result.normal = side * smooth / length;
+        // A smooth surface's shadows must not begin where its flat facets turn from the light: the point moves to the
+        // tangent planes of the corners (Hanika 2021, "Hacking the Shadow Terminator", Ray Tracing Gems II).
+        const std::uint32_t corners[] = {a, b, c};
+        const float weights[] = {wa, wb, wc};
+        for (int k = 0; k < 3; ++k) {
+          const vec3 tangent = side * mesh.normal[corners[k]];
+          result.start -= weights[k] * std::min(glm::dot(result.point - mesh.position[corners[k]], tangent), 0.0f) * tangent;
+        }
+      }
     }
     return true;
   }
 
   /// Where shadow rays of a point may start.
   vec3 beside(const Hit& hit) const {
-    return hit.point + hit.face * surfaceOffset(meshes_[hit.solid].triangle(hit.triangle), hit.point);
+    return hit.start + hit.face * surfaceOffset(meshes_[hit.solid].triangle(hit.triangle), hit.point);
   }
 
   /// Edge of a pixel at a depth [scene units].
