@@ -13,11 +13,11 @@ namespace mote {
 namespace {
 
 /// Where the rays of a pixel go: Hammersley's points, so that edges of any slope, upright and level ones too, meet
-/// sixteen different steps.
-vec2 rayPlace(int k) {
-  const unsigned i = static_cast<unsigned>(k);
-  const unsigned reversed = (i & 1) << 3 | (i & 2) << 1 | (i & 4) >> 1 | (i & 8) >> 3;
-  return {(static_cast<float>(k) + 0.5f) / kSurfaceRays, (static_cast<float>(reversed) + 0.5f) / kSurfaceRays};
+/// as many different steps as there are rays.
+vec2 rayPlace(int k, int count) {
+  float inverse = 0.5f / static_cast<float>(count), digit = 0.5f;
+  for (int i = k; i > 0; i /= 2, digit /= 2) inverse += static_cast<float>(i % 2) * digit;
+  return {(static_cast<float>(k) + 0.5f) / static_cast<float>(count), inverse};
 }
 
 struct Hit {
@@ -29,7 +29,7 @@ struct Hit {
 
 /// The rays of one surface in a pixel, as indices into the pixel's hits.
 struct Group {
-  std::array<int, kSurfaceRays> hits;
+  std::array<int, kEdgeRays> hits;
   int count = 0;
 };
 
@@ -147,7 +147,7 @@ void mergeGroups(std::vector<Group>& groups, const Hit* hits) {
   }
 }
 
-Surface surfaceOf(const Group& group, const Hit* hits, std::uint32_t pixel, const Tracer& tracer) {
+Surface surfaceOf(const Group& group, const Hit* hits, int rays, std::uint32_t pixel, const Tracer& tracer) {
   vec3 middle(0), normal(0);
   for (int k = 0; k < group.count; ++k) {
     const Hit& hit = hits[group.hits[static_cast<std::size_t>(k)]];
@@ -162,7 +162,7 @@ Surface surfaceOf(const Group& group, const Hit* hits, std::uint32_t pixel, cons
   Surface surface{};
   surface.pixel = pixel;
   surface.solid = static_cast<std::uint16_t>(hits[lit].solid);
-  surface.coverage = static_cast<float>(group.count) / kSurfaceRays;
+  surface.coverage = static_cast<float>(group.count) / static_cast<float>(rays);
   surface.depth = meanDepth(group, hits);
   surface.normal = glm::length(normal) > 0 ? glm::normalize(normal) : hits[lit].normal;
   surface.shadowPoints = static_cast<std::uint16_t>(std::min(group.count, kShadowPoints));
@@ -173,12 +173,12 @@ Surface surfaceOf(const Group& group, const Hit* hits, std::uint32_t pixel, cons
   return surface;
 }
 
-void tracePixel(const Tracer& tracer, int x, int y, std::uint32_t pixel, std::vector<Surface>& out) {
-  Hit hits[kSurfaceRays];
+/// Casts rays through a pixel; fills `hits` and what belongs together.
+int castRays(const Tracer& tracer, int x, int y, int rays, Hit* hits, std::vector<Group>& groups) {
   int count = 0;
-  for (int k = 0; k < kSurfaceRays; ++k)
-    if (tracer.hit(vec2(x, y) + rayPlace(k), hits[count])) ++count;
-  std::vector<Group> groups;
+  for (int k = 0; k < rays; ++k)
+    if (tracer.hit(vec2(x, y) + rayPlace(k, rays), hits[count])) ++count;
+  groups.clear();
   for (int k = 0; k < count; ++k) {
     const float edge = tracer.pixelEdge(hits[k].depth);
     auto mine = std::find_if(groups.begin(), groups.end(),
@@ -186,8 +186,28 @@ void tracePixel(const Tracer& tracer, int x, int y, std::uint32_t pixel, std::ve
     if (mine == groups.end()) mine = groups.insert(groups.end(), Group{});
     mine->hits[static_cast<std::size_t>(mine->count++)] = k;
   }
+  return count;
+}
+
+/// True where an edge runs through the pixel: its rays, or those through its corners, meet different things.
+bool crossed(const Tracer& tracer, int x, int y, int count, const Hit* hits, const std::vector<Group>& groups) {
+  if ((count != 0 && count != kSurfaceRays) || groups.size() > 1) return true;
+  for (int corner = 0; corner < 4; ++corner) {
+    Hit hit;
+    const bool met = tracer.hit(vec2(x + corner % 2, y + corner / 2), hit);
+    if (met != (count > 0) || (met && !together(hits[0], hit, tracer.pixelEdge(hit.depth)))) return true;
+  }
+  return false;
+}
+
+void tracePixel(const Tracer& tracer, int x, int y, std::uint32_t pixel, std::vector<Surface>& out) {
+  Hit hits[kEdgeRays];
+  std::vector<Group> groups;
+  int rays = kSurfaceRays;
+  const int count = castRays(tracer, x, y, rays, hits, groups);
+  if (crossed(tracer, x, y, count, hits, groups)) castRays(tracer, x, y, rays = kEdgeRays, hits, groups);
   mergeGroups(groups, hits);
-  for (const Group& group : groups) out.push_back(surfaceOf(group, hits, pixel, tracer));
+  for (const Group& group : groups) out.push_back(surfaceOf(group, hits, rays, pixel, tracer));
 }
 
 }  // namespace
@@ -210,7 +230,7 @@ const Surface* Surfaces::at(std::size_t pixel, int k, float& coverage) const {
     return &all[begin + place];
   }
   coverage = 0;
-  if (place == count) {  // what is beside them: coverages are sixteenths, their sum is exact
+  if (place == count) {  // what is beside them: coverages are in 64ths, their sum is exact
     coverage = 1;
     for (std::size_t i = begin; i < begin + count; ++i) coverage -= all[i].coverage;
   }
