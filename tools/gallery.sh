@@ -12,7 +12,7 @@ plume=scenes/plume.json cloud=scenes/cloud.json
 # NAME | SCENE | CAPTION | FLAGS
 gallery=(
   "still|scenes/gallery/lens.json|Figure 21, left: a still plume|"
-  "motion_blur|scenes/gallery/lens.json|Figure 21, centre: motion blur, particles and camera move|--set /camera/shutter=[-0.5,0.5]"
+  "motion_blur|scenes/gallery/lens.json|Figure 21, centre: motion blur, particles and camera move|--set /camera/shutter=[-0.12,0.12]"
   "depth_of_field|scenes/gallery/lens.json|Figure 21, right: depth of field|--set /camera/aperture_radius=0.12"
   "plume|$plume|Figure 26: smoke plume, 350,000 particles|"
   "cloud|$cloud|Figure 27: cloud, 9,000,000 particles|--set /particles/0/count=9000000"
