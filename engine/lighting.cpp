@@ -38,15 +38,14 @@ void leaveOut(const std::vector<std::uint8_t>& blocked, std::vector<std::uint8_t
 }  // namespace
 
 ShadowSources hostShadows(const Frame& frame) {
-  return {.opticalDepths =
-              [&frame](const Receivers& receivers, const layout::Light& light, std::span<const std::uint8_t> reached,
-                       const RaysDone& done) {
-                return opticalDepths(frame.density.tree(), receivers, light, frame.rules, reached, done);
-              },
-          .occluded =
-              [&frame](const Receivers& receivers, std::span<const std::uint8_t> wanted, const layout::Light& light) {
-                return occluded(frame.solidTree, receivers, wanted, light);
-              }};
+  return {
+      .opticalDepths =
+          [&frame](const Receivers& receivers, const layout::Light& light, std::span<const std::uint8_t> reached,
+                   const RaysDone& done) {
+            return opticalDepths(frame.density.tree(), receivers, light, frame.rules, reached, done);
+          },
+      .occluded = [&frame](const Receivers& receivers, std::span<const std::uint8_t> wanted,
+                           const layout::Light& light) { return occluded(frame.solidTree, receivers, wanted, light); }};
 }
 
 std::vector<float> shadows(const Frame& frame, const Receivers& receivers, const layout::Light& light,
@@ -77,9 +76,8 @@ LitParticles lightParticles(const Frame& frame, const ShadowSources& sources, Li
   lit.radiance.assign(count, vec3(0));
   Progress progress("lighting", static_cast<double>(count) * static_cast<double>(frame.lights.size()));
   for (const layout::Light& light : frame.lights) {
-    std::vector<float> transmittance = shadows(frame, receivers, light, sources, [&](std::size_t rays) {
-      progress.advance(static_cast<double>(rays));
-    });
+    std::vector<float> transmittance = shadows(frame, receivers, light, sources,
+                                               [&](std::size_t rays) { progress.advance(static_cast<double>(rays)); });
     if (wanted.byLight) {
       std::vector<vec3>& own = lit.byLight.emplace_back(count, vec3(0));
       addInScattering(receivers, radii, light, transmittance, frame.scattering, own);

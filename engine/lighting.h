@@ -11,8 +11,8 @@ namespace mote {
 using OpticalDepthSource = std::function<std::vector<float>(const Receivers&, const layout::Light&,
                                                             std::span<const std::uint8_t> reached, const RaysDone&)>;
 /// A function that says which receivers solids keep from a light, as mote::occluded.
-using OcclusionSource = std::function<std::vector<std::uint8_t>(
-    const Receivers&, std::span<const std::uint8_t> wanted, const layout::Light&)>;
+using OcclusionSource = std::function<std::vector<std::uint8_t>(const Receivers&, std::span<const std::uint8_t> wanted,
+                                                                const layout::Light&)>;
 
 /// What computes the two halves of every shadow.
 struct ShadowSources {
@@ -34,7 +34,7 @@ struct LightWanted {
 
 /// What the lights do to the particles, in the order of the receivers.
 struct LitParticles {
-  std::vector<vec3> radiance;                     ///< in-scattered radiance Σ p·E·T·S [W/(m² sr)], before the albedo
+  std::vector<vec3> radiance;  ///< in-scattered radiance Σ p·E·T·S [W/(m² sr)], before the albedo
   std::vector<std::vector<float>> transmittance;  ///< T·S, one a light, [channel][receiver]; empty unless wanted
   std::vector<std::vector<vec3>> byLight;         ///< one a light, the summands of `radiance`; empty unless wanted
 };

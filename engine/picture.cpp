@@ -68,8 +68,7 @@ class Composer {
     sum.pixels[p] += coverage * vec4(vec3(medium) + seen, medium.w + behind);
     if (!sum.alpha.empty()) sum.alpha[p] += coverage * (shaded ? vec3(1) : alpha);
     if (!sum.opticalDepth.empty()) sum.opticalDepth[p] += coverage * drawn.opticalDepth[p];
-    if (!sum.depth.empty())
-      sum.depth[p] = std::min({sum.depth[p], drawn.depth[p], shaded ? surface->depth : kNoDepth});
+    if (!sum.depth.empty()) sum.depth[p] = std::min({sum.depth[p], drawn.depth[p], shaded ? surface->depth : kNoDepth});
     if (!sum.velocity.empty()) {
       const vec2 own = shaded ? screenVelocity(surface->points[0], vec3(0), set_.scene) : vec2(0);
       sum.velocity[p] += coverage * (medium.w * drawn.velocity[p] + behind * own);
@@ -110,7 +109,8 @@ Image makePicture(const Frame& frame, const Scene& scene, const SplatSet& set, L
   std::vector<ImageLayer> shadows;
   std::vector<SurfaceRadiance> byLight;
   SurfaceRadiance total(surfaces.all.size(), vec3(0));
-  const std::size_t pixels = static_cast<std::size_t>(scene.output.size.x) * static_cast<std::size_t>(scene.output.size.y);
+  const std::size_t pixels =
+      static_cast<std::size_t>(scene.output.size.x) * static_cast<std::size_t>(scene.output.size.y);
   for (std::size_t l = 0; l < frame.lights.size(); ++l) {
     SurfaceLight own;
     if (!surfaces.empty()) own = lightSurfaces(frame, scene, surfaces, frame.lights[l], sources);

@@ -17,7 +17,8 @@ namespace mote {
 ///   optical_depth    of the medium up to the surface, weighted by coverage
 ///   velocity         of medium and shaded surfaces, weighted by what each adds to α
 ///   shadow.<light>   T · S at the surfaces, weighted by coverage; 1 where there is none. Holdouts have it as well
-///   light.<name>.*   the picture by one light alone; `emission.*` what the particles give out. Their sum is the picture
+///   light.<name>.*   the picture by one light alone; `emission.*` what the particles give out. Their sum is the
+///   picture
 /// `lit` is taken apart on the way. `sources` serve the surfaces; `seconds` get "solids".
 Image makePicture(const Frame& frame, const Scene& scene, const SplatSet& set, LitParticles lit,
                   const Surfaces& surfaces, Rasterizer& rasterizer, const ShadowSources& sources);

@@ -52,7 +52,10 @@ class HostRasterizer : public Rasterizer {
 class DeviceRasterizer : public Rasterizer {
  public:
   DeviceRasterizer(const Device& device, SplatSet set, float keyScale, FrameStats& stats)
-      : device_(device), set_(std::move(set)), stats_(stats), count_(static_cast<std::uint32_t>(set_.particles.size())) {
+      : device_(device),
+        set_(std::move(set)),
+        stats_(stats),
+        count_(static_cast<std::uint32_t>(set_.particles.size())) {
     Timer timer;
     particles_ = device.createBufferWith<layout::SplatParticle>(set_.particles);
     indices_ = device.createBuffer(count_ * sizeof(std::uint32_t));
@@ -104,8 +107,8 @@ class DeviceRasterizer : public Rasterizer {
   Image drawFast(bool withDepth, const std::function<void(std::uint32_t)>& advance) {
     const layout::SplatCamera& camera = set_.camera();
     const SplatPass pass(device_, camera.falloff, withDepth);
-    const SplatTarget target =
-        pass.createTarget(static_cast<std::uint32_t>(camera.imageSize.x), static_cast<std::uint32_t>(camera.imageSize.y));
+    const SplatTarget target = pass.createTarget(static_cast<std::uint32_t>(camera.imageSize.x),
+                                                 static_cast<std::uint32_t>(camera.imageSize.y));
     TimestampQueries queries = device_.createTimestampQueries(pass.submissions(count_));
     pass.draw(target, particles_, indices_, count_, camera, &queries, advance);
     for (const StageTime& time : queries.results()) stats_.deviceSeconds[time.stage] += time.seconds;

@@ -69,8 +69,7 @@ SurfaceLight lightSurfaces(const Frame& frame, const Scene& scene, const Surface
       result.shadow[i] = grey ? passes.x : (passes.x + passes.y + passes.z) / 3;
       if (solid.mode != SolidMode::Shaded) continue;
       const float cosine = std::max(-glm::dot(travelDirection(light, point), surface.normal), 0.0f);
-      result.radiance[i] =
-          solid.albedo * (cosine / static_cast<float>(kPi)) * irradiance(light, point, 1e-6f) * passes;
+      result.radiance[i] = solid.albedo * (cosine / static_cast<float>(kPi)) * irradiance(light, point, 1e-6f) * passes;
     }
   });
   return result;

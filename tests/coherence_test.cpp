@@ -1,5 +1,5 @@
-// Temporal coherence of the light (Monette 2011, §4.3): what moves together changes nothing, what moves a little changes
-// little, and the tree's cells are not seen.
+// Temporal coherence of the light (Monette 2011, §4.3): what moves together changes nothing, what moves a little
+// changes little, and the tree's cells are not seen.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -51,7 +51,8 @@ double worst(const std::vector<float>& a, const std::vector<float>& b, std::size
 
 TEST(Coherence, ARigidMotionOfParticlesAndLightsLeavesEveryTransmittance) {
   const Cloud cloud = ball(20000);
-  const layout::Light lights[] = {pointLight({2, 1, 1}), pointLight({0.2f, 0.1f, -0.3f}), directionalLight({0.3f, -1, 0.2f})};
+  const layout::Light lights[] = {pointLight({2, 1, 1}), pointLight({0.2f, 0.1f, -0.3f}),
+                                  directionalLight({0.3f, -1, 0.2f})};
   double found = 0;
   for (const layout::uint endpoint : kEndpoints)
     for (const layout::Light& light : lights) {

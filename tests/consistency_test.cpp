@@ -72,7 +72,8 @@ TEST_P(ViewEqualsLight, OfADirectionalLightAndAnOrthographicCamera) {
   constexpr int kSize = 64;
   const layout::uint falloff = GetParam();
   const layout::Light light = directionalLight({0.3f, -0.8f, -0.5f});
-  layout::SplatCamera camera = makeSplatCamera(-5.0f * light.direction, {0, 0, 0}, {0, 0, 1}, 40, 0.1f, 100, kSize, kSize, falloff);
+  layout::SplatCamera camera =
+      makeSplatCamera(-5.0f * light.direction, {0, 0, 0}, {0, 0, 1}, 40, 0.1f, 100, kSize, kSize, falloff);
   makeOrthographic(camera, 2.2f);
 
   std::vector<vec3> position;
@@ -90,9 +91,12 @@ TEST_P(ViewEqualsLight, OfADirectionalLightAndAnOrthographicCamera) {
   const std::vector<std::uint32_t> selves(kSize * kSize, kNoSlot);
   for (int row = 0; row < kSize; ++row)
     for (int column = 0; column < kSize; ++column) {
-      const double u = (column + 0.5 - kSize / 2.0) * camera.pixelSize, v = (kSize / 2.0 - (row + 0.5)) * camera.pixelSize;
-      const dvec3 point = dvec3(camera.position) + u * dvec3(camera.right) + v * dvec3(camera.up) + 7.0 * dvec3(camera.forward);
-      x.push_back(static_cast<float>(point.x)), y.push_back(static_cast<float>(point.y)), z.push_back(static_cast<float>(point.z));
+      const double u = (column + 0.5 - kSize / 2.0) * camera.pixelSize,
+                   v = (kSize / 2.0 - (row + 0.5)) * camera.pixelSize;
+      const dvec3 point =
+          dvec3(camera.position) + u * dvec3(camera.right) + v * dvec3(camera.up) + 7.0 * dvec3(camera.forward);
+      x.push_back(static_cast<float>(point.x)), y.push_back(static_cast<float>(point.y)),
+          z.push_back(static_cast<float>(point.z));
     }
   const Octree tree = buildOctree(position, radius, peak);
   const std::vector<float> lit = transmittances(

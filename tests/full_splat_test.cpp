@@ -45,12 +45,14 @@ Image draw(const SplatSet& set, SplatLayers layers = {}, std::span<const float> 
 }
 
 /// Particles before the camera, `radius` pixels of support, well inside the picture.
-std::vector<SplatParticle> scattered(const SplatCamera& camera, std::size_t count, double leastPixels, double mostPixels) {
+std::vector<SplatParticle> scattered(const SplatCamera& camera, std::size_t count, double leastPixels,
+                                     double mostPixels) {
   std::vector<SplatParticle> particles;
   for (std::size_t i = 0; i < count; ++i) {
     Random random(3, i);
     const double depth = random.uniform(3, 6);
-    const double u = random.uniform(-0.4, 0.4) * camera.halfExtent.x * 2, v = random.uniform(-0.4, 0.4) * camera.halfExtent.y * 2;
+    const double u = random.uniform(-0.4, 0.4) * camera.halfExtent.x * 2,
+                 v = random.uniform(-0.4, 0.4) * camera.halfExtent.y * 2;
     const double pixels = random.uniform(leastPixels, mostPixels);
     particles.push_back({vec3(u * depth, v * depth, -depth), static_cast<float>(pixels * camera.pixelSize * depth),
                          vec3(1, 0.5f, 0.25f), static_cast<float>(random.uniform(0.01, 2))});
@@ -62,7 +64,9 @@ double sumOf(const std::vector<float>& values) { return std::accumulate(values.b
 
 double oracleFalloff(double q, uint kind) {
   if (q >= 1) return 0;
-  return kind == layout::kFalloffLinear ? 1 - std::sqrt(q) : kind == layout::kFalloffSphere ? std::sqrt(1 - q) : (1 - q) * (1 - q);
+  return kind == layout::kFalloffLinear   ? 1 - std::sqrt(q)
+         : kind == layout::kFalloffSphere ? std::sqrt(1 - q)
+                                          : (1 - q) * (1 - q);
 }
 
 TEST(FullSplat, EqualsThePlainRasteriserWhereNothingSpecialIsAsked) {
@@ -74,7 +78,8 @@ TEST(FullSplat, EqualsThePlainRasteriserWhereNothingSpecialIsAsked) {
     const Image plain = rasterize(particles, identity(2000), camera, true), full = draw(set, {.depth = true});
     EXPECT_EQ(plain.depth, full.depth);
     for (std::size_t i = 0; i < plain.pixels.size(); ++i)
-      for (int c = 0; c < 4; ++c) ASSERT_NEAR(plain.pixels[i][c], full.pixels[i][c], kind == layout::kFalloffSphere ? 1e-5 : 2e-6)
+      for (int c = 0; c < 4; ++c)
+        ASSERT_NEAR(plain.pixels[i][c], full.pixels[i][c], kind == layout::kFalloffSphere ? 1e-5 : 2e-6)
             << "falloff " << kind;  // a sphere's rim is steep
   }
 }
@@ -130,7 +135,8 @@ TEST(FullSplat, MotionBlurIsTheMeanOpticalDepthOverTheShutter) {
     const double peak = *std::max_element(mean.begin(), mean.end());
     // Smooth is exact but for the pinhole's change of b along the path; the other falloffs have kinks.
     const double tolerance = kind == layout::kFalloffSmooth ? 0.002 : 0.02;
-    for (std::size_t i = 0; i < mean.size(); ++i) ASSERT_NEAR(blurred[i], mean[i], tolerance * peak) << "falloff " << kind;
+    for (std::size_t i = 0; i < mean.size(); ++i)
+      ASSERT_NEAR(blurred[i], mean[i], tolerance * peak) << "falloff " << kind;
   }
 }
 
@@ -182,7 +188,8 @@ TEST(FullSplat, EachColourHasItsOwnOpacity) {
   const vec3 tau(0.7 * 2, 0.7 * 2, 0.7 * 3);
   for (int c = 0; c < 3; ++c) {
     EXPECT_NEAR(image.alpha[16 * 33 + 16][c], 1 - std::exp(-tau[c]), 1e-6) << c;
-    EXPECT_NEAR(image.at(16, 16)[c], (1 - std::exp(-tau[c])) * particle.radiance[c], 1e-5) << c;  // the same radiance twice
+    EXPECT_NEAR(image.at(16, 16)[c], (1 - std::exp(-tau[c])) * particle.radiance[c], 1e-5)
+        << c;  // the same radiance twice
   }
   const vec3& alpha = image.alpha[16 * 33 + 16];
   EXPECT_FLOAT_EQ(image.at(16, 16).w, (alpha.x + alpha.y + alpha.z) / 3);
@@ -209,7 +216,8 @@ TEST(FullSplat, OrthographicAndAnamorphicCamerasFollowTheirDefinition) {
   for (const bool orthographic : {true, false})
     for (const float aspect : {1.0f, 2.0f, 0.5f})
       for (const uint kind : kFalloffs) {
-        SplatCamera camera = makeSplatCamera(vec3(1, 2, 3), vec3(0.2f, 0.1f, -1), vec3(0.1f, 1, 0), 40, 0.01f, 1000, 96, 64, kind);
+        SplatCamera camera =
+            makeSplatCamera(vec3(1, 2, 3), vec3(0.2f, 0.1f, -1), vec3(0.1f, 1, 0), 40, 0.01f, 1000, 96, 64, kind);
         if (orthographic) makeOrthographic(camera, 3);
         setPixelAspect(camera, aspect);
         const SplatParticle particle{vec3(0.5f, 0.9f, 0.4f), 0.5f, vec3(1), 0.9f};
@@ -289,8 +297,8 @@ TEST(FullSplat, OrthographicDepthKeysSortByDepth) {
   SplatCamera camera = cameraAtOrigin(64, 64);
   makeOrthographic(camera, 4);
   // Farther from the camera as the crow flies, but nearer along the axis.
-  const std::vector<SplatParticle> particles{{vec3(0, 0, -2), 0.1f, vec3(1), 1}, {vec3(3, 0, -1), 0.1f, vec3(1), 1},
-                                             {vec3(0, 0, 1), 0.1f, vec3(1), 1}};
+  const std::vector<SplatParticle> particles{
+      {vec3(0, 0, -2), 0.1f, vec3(1), 1}, {vec3(3, 0, -1), 0.1f, vec3(1), 1}, {vec3(0, 0, 1), 0.1f, vec3(1), 1}};
   EXPECT_EQ(sortByDepth(particles, camera, 0.25f), (std::vector<uint>{0, 1, 2}));
   EXPECT_EQ(sortByDepth(particles, cameraAtOrigin(64, 64), 0.25f), (std::vector<uint>{1, 0, 2}));
 }

@@ -85,8 +85,7 @@ class FullDisk {
   rlimit limit_{};
 };
 
-// ---- EXR out and in
-// ---------------------------------------------------------------------------------------------------
+// ---- EXR out and in ----
 
 TEST(Exr, FloatComesBackBitForBitWithEveryCompression) {
   const TempFolder folder;
@@ -251,8 +250,7 @@ TEST(Exr, ReplacesAnOlderFileWhole) {
   EXPECT_EQ(folder.entries().size(), 1u);
 }
 
-// ---- EXR from elsewhere
-// -----------------------------------------------------------------------------------------------
+// ---- EXR from elsewhere ----
 
 /// A file of other makers: float channels `names`, every value 1 + its channel's place, with the windows given.
 void writeForeign(const std::string& path, const std::vector<std::string>& names, const Imath::Box2i& data,
@@ -346,8 +344,7 @@ TEST(ReadExr, RejectsAFileCutAtAnyByte) {
   }
 }
 
-// ---- where it cannot be written
-// ---------------------------------------------------------------------------------------
+// ---- where it cannot be written ----
 
 using Writer = void (*)(const std::string&, const Image&);
 struct NamedWriter {
@@ -419,8 +416,7 @@ TEST(WritePicture, DiskFullAtAnyPointIsAMachineErrorAndLeavesNothingBehind) {
   }
 }
 
-// ---- PNG
-// --------------------------------------------------------------------------------------------------------------
+// ---- PNG ----
 
 struct Png {
   int width = 0, height = 0, channels = 0, bits = 0, intent = -1;
@@ -448,6 +444,53 @@ Png readPng(const std::string& path) {
   png_destroy_read_struct(&png, &info, nullptr);
   std::fclose(file);
   return out;
+}
+
+/// An RGBA file, straight alpha.
+void writeRgbaPng(const std::string& path, const std::vector<std::uint8_t>& rgba, int width, int height) {
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  png.width = static_cast<png_uint_32>(width), png.height = static_cast<png_uint_32>(height);
+  png.format = PNG_FORMAT_RGBA;
+  ASSERT_TRUE(png_image_write_to_file(&png, path.c_str(), 0, rgba.data(), 0, nullptr));
+}
+
+TEST(Png, ReadsWhatItWroteAsLinearColour) {
+  const TempFolder folder;
+  Image image(3, 2);
+  for (std::size_t i = 0; i < 6; ++i)
+    image.pixels[i] = vec4(0.15f * static_cast<float>(i), 1, 0.0006f * static_cast<float>(i), 1);
+  writePng(folder.file("a.png"), image);
+  const Image read = readPng(folder.file("a.png"), PngValues::Color);
+  ASSERT_EQ(read.width, 3);
+  ASSERT_EQ(read.height, 2);
+  for (std::size_t i = 0; i < 6; ++i)
+    for (int c = 0; c < 4; ++c)  // half a code value; blue is in the linear part
+      EXPECT_NEAR(read.pixels[i][c], image.pixels[i][c], c == 0 ? 0.0045f : 0.00016f) << i << ", " << c;
+}
+
+TEST(Png, ReadsDataAsItStandsAndAlphaApart) {
+  const TempFolder folder;
+  writeRgbaPng(folder.file("a.png"), {51, 102, 153, 204, 255, 0, 255, 0}, 1, 2);
+  const Image read = readPng(folder.file("a.png"), PngValues::Data);
+  ASSERT_EQ(read.pixels.size(), 2u);
+  for (int c = 0; c < 4; ++c) EXPECT_FLOAT_EQ(read.pixels[0][c], 0.2f * static_cast<float>(c + 1));
+  EXPECT_EQ(read.pixels[1], vec4(1, 0, 1, 0)) << "not premultiplied: a pixel of no opacity keeps its colour";
+}
+
+TEST(Png, RefusesWhatIsNoWholePicture) {
+  const TempFolder folder;
+  EXPECT_THROW(readPng(folder.file("gone.png"), PngValues::Data), InputError);
+  writeRgbaPng(folder.file("a.png"), std::vector<std::uint8_t>(4 * 64 * 64, 77), 64, 64);
+  const std::string bytes = readBytes(folder.file("a.png"));
+  for (const std::size_t length : {std::size_t{0}, std::size_t{7}, std::size_t{20}, std::size_t{40}, bytes.size() / 2}) {
+    writeBytes(folder.file("b.png"), bytes.substr(0, length));
+    EXPECT_THROW(readPng(folder.file("b.png"), PngValues::Data), InputError) << length << " bytes";
+  }
+  std::string huge = bytes;  // a width of 65,536
+  huge[16] = 0, huge[17] = 1, huge[18] = 0, huge[19] = 0;
+  writeBytes(folder.file("b.png"), huge);
+  EXPECT_THROW(readPng(folder.file("b.png"), PngValues::Data), InputError);
 }
 
 TEST(Srgb, IsTheInverseOfTheStandardsDecoding) {
@@ -506,8 +549,7 @@ TEST(Png, SameInputGivesTheSameBytes) {
   EXPECT_TRUE(readBytes(folder.file("a.png")) == readBytes(folder.file("b.png")));
 }
 
-// ---- comparison
-// -------------------------------------------------------------------------------------------------------
+// ---- comparison ----
 
 TEST(Compare, NumbersOfAHandMadePair) {
   Image a(4, 2), b(4, 2);

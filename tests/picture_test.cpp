@@ -39,7 +39,8 @@ class Picture : public ::testing::Test {
 
   /// `parts`: keys beside "particles".
   Image render(const std::string& parts) {
-    writeBytes(folder.file("scene.json"), R"({"particles": [{"file": "particles.prt", "radius": {"channel": "Radius"}}], )" + parts + "}");
+    writeBytes(folder.file("scene.json"),
+               R"({"particles": [{"file": "particles.prt", "radius": {"channel": "Radius"}}], )" + parts + "}");
     Scene scene = readScene(folder.file("scene.json"));
     FrameStats stats;
     frame = prepareFrame(scene, 1, stats);
@@ -60,7 +61,8 @@ class Picture : public ::testing::Test {
 // A camera 4 units before the plane z = 0, whose picture is 2.4 high there.
 constexpr const char* kCamera =
     R"("camera": {"position": [0, 0, 4], "target": [0, 0, 0], "fov": 33.39849, "near": 0.1, "far": 100},)";
-constexpr const char* kSun = R"("lights": [{"name": "sun", "type": "directional", "direction": [0, 0, -1], "irradiance": 3}],)";
+constexpr const char* kSun =
+    R"("lights": [{"name": "sun", "type": "directional", "direction": [0, 0, -1], "irradiance": 3}],)";
 constexpr const char* kPeak = R"("medium": {"density_mode": "peak", "density_scale": 1},)";
 
 /// Area of the part of a triangle inside a pixel, by Sutherland and Hodgman's clipping, in double.
@@ -76,8 +78,10 @@ double coveredArea(std::vector<dvec2> polygon, double left, double top) {
   };
   for (const int axis : {0, 1}) {
     const double low = axis == 0 ? left : top;
-    clip([&](const dvec2& p) { return p[axis] >= low; }, [&](const dvec2& a, const dvec2& b) { return (low - a[axis]) / (b[axis] - a[axis]); });
-    clip([&](const dvec2& p) { return p[axis] <= low + 1; }, [&](const dvec2& a, const dvec2& b) { return (low + 1 - a[axis]) / (b[axis] - a[axis]); });
+    clip([&](const dvec2& p) { return p[axis] >= low; },
+         [&](const dvec2& a, const dvec2& b) { return (low - a[axis]) / (b[axis] - a[axis]); });
+    clip([&](const dvec2& p) { return p[axis] <= low + 1; },
+         [&](const dvec2& a, const dvec2& b) { return (low + 1 - a[axis]) / (b[axis] - a[axis]); });
   }
   double area = 0;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -88,8 +92,9 @@ double coveredArea(std::vector<dvec2> polygon, double left, double top) {
 }
 
 TEST_F(Picture, EdgesOfSolidsHaveTheExactAreaOfThePixelAsAlpha) {
-  const Image image = render(std::string(kCamera) + kSun + kPeak +
-                             R"("solids": [{"name": "t", "file": "triangle.obj", "mode": "shaded"}], "output": {"size": [120, 120]})");
+  const Image image =
+      render(std::string(kCamera) + kSun + kPeak +
+             R"("solids": [{"name": "t", "file": "triangle.obj", "mode": "shaded"}], "output": {"size": [120, 120]})");
   const auto onPicture = [&](double x, double y) {
     const double scale = 1 / (4 * double(frame.view.pixelSize));
     return dvec2(60 + x * scale, 60 - y * scale);
@@ -101,8 +106,10 @@ TEST_F(Picture, EdgesOfSolidsHaveTheExactAreaOfThePixelAsAlpha) {
     for (int x = 0; x < 120; ++x) {
       const double area = coveredArea(triangle, x, y), error = std::fabs(image.at(x, y).w - area);
       worst = std::max(worst, error);
-      if (area > 0 && area < 1) mean += error, ++edges;
-      else ASSERT_EQ(image.at(x, y).w, static_cast<float>(area)) << x << ' ' << y;
+      if (area > 0 && area < 1)
+        mean += error, ++edges;
+      else
+        ASSERT_EQ(image.at(x, y).w, static_cast<float>(area)) << x << ' ' << y;
     }
   ASSERT_GT(edges, 150);
   std::printf("coverage of %d edge pixels: worst %.3f, mean %.3f\n", edges, worst, mean / edges);
@@ -111,8 +118,9 @@ TEST_F(Picture, EdgesOfSolidsHaveTheExactAreaOfThePixelAsAlpha) {
 }
 
 TEST_F(Picture, ShadedSolidsFollowLambertsLaw) {
-  const Image image = render(std::string(kCamera) + kPeak +
-                             R"("lights": [{"name": "sun", "type": "directional", "direction": [1, 0, -1], "irradiance": 3},
+  const Image image =
+      render(std::string(kCamera) + kPeak +
+             R"("lights": [{"name": "sun", "type": "directional", "direction": [1, 0, -1], "irradiance": 3},
                                            {"name": "lamp", "type": "point", "position": [0, 0, 2], "intensity": 5},
                                            {"name": "behind", "type": "point", "position": [0, 0, -2], "intensity": 500}],
                                 "solids": [{"name": "s", "file": "square.obj", "albedo": [0.2, 0.4, 0.8]}],
@@ -132,7 +140,12 @@ TEST_F(Picture, HoldoutsCutTheMediumAndHaveNoAlpha) {
   const std::string rest = std::string(kCamera) + kSun + kPeak;
   const std::string size = R"("output": {"size": [61, 61], "aovs": ["Z", "optical_depth"]})";
   const auto with = [&](float z) {
-    return render(rest + fmt::format(R"("solids": [{{"name": "s", "file": "square.obj", "mode": "holdout", "scale": 0.5, "translate": [0, 0, {}]}}],)", z) + size);
+    return render(
+        rest +
+        fmt::format(
+            R"("solids": [{{"name": "s", "file": "square.obj", "mode": "holdout", "scale": 0.5, "translate": [0, 0, {}]}}],)",
+            z) +
+        size);
   };
   const Image none = render(rest + size), before = with(2), middle = with(0), behind = with(-2);
   const std::size_t centre = 30 * 61 + 30, corner = 3 * 61 + 30;
@@ -151,7 +164,9 @@ TEST_F(Picture, EdgesAgainstTheMediumMixBothSidesByCoverageWithoutAHalo) {
   const std::string rest = std::string(kCamera) + kSun + kPeak;
   const std::string output = R"("output": {"size": [80, 80]})";
   for (const char* mode : {"shaded", "holdout"}) {
-    const std::string solid = fmt::format(R"("solids": [{{"name": "t", "file": "triangle.obj", "albedo": [0, 0, 0], "casts_shadows": false, "mode": "{}"}}],)", mode);
+    const std::string solid = fmt::format(
+        R"("solids": [{{"name": "t", "file": "triangle.obj", "albedo": [0, 0, 0], "casts_shadows": false, "mode": "{}"}}],)",
+        mode);
     const Image image = render(rest + solid + output), fog = render(rest + output);
     // Fully covered: by the fog between camera and triangle, the same everywhere but for the slant of the ray.
     const vec4 inside = image.at(39, 42);
@@ -162,7 +177,8 @@ TEST_F(Picture, EdgesAgainstTheMediumMixBothSidesByCoverageWithoutAHalo) {
           const float low = std::min(inside[c], fog.at(x, y)[c]), high = std::max(inside[c], fog.at(x, y)[c]);
           ASSERT_GE(image.at(x, y)[c], low - 0.02f * high) << x << ' ' << y << ' ' << c;
           ASSERT_LE(image.at(x, y)[c], high + 0.02f * high) << x << ' ' << y << ' ' << c;
-          edges += c == 0 && image.at(x, y)[c] > low + 0.1f * (high - low) && image.at(x, y)[c] < high - 0.1f * (high - low);
+          edges +=
+              c == 0 && image.at(x, y)[c] > low + 0.1f * (high - low) && image.at(x, y)[c] < high - 0.1f * (high - low);
         }
     EXPECT_GT(edges, 50);
   }
@@ -171,10 +187,11 @@ TEST_F(Picture, EdgesAgainstTheMediumMixBothSidesByCoverageWithoutAHalo) {
 TEST_F(Picture, TheMediumsShadowOnASolidIsItsTransmittanceThere) {
   one({0, 0, 1}, 0.8f, 1.3f);
   for (const char* mode : {"shaded", "holdout"}) {
-    const Image image = render(
-        R"("camera": {"position": [3, 0, 3], "target": [0, 0, 0], "fov": 40},)" + std::string(kSun) + kPeak +
-        fmt::format(R"("solids": [{{"name": "s", "file": "square.obj", "mode": "{}"}}],
-                      "output": {{"size": [101, 101], "aovs": ["shadow", "Z"]}})", mode));
+    const Image image =
+        render(R"("camera": {"position": [3, 0, 3], "target": [0, 0, 0], "fov": 40},)" + std::string(kSun) + kPeak +
+               fmt::format(R"("solids": [{{"name": "s", "file": "square.obj", "mode": "{}"}}],
+                      "output": {{"size": [101, 101], "aovs": ["shadow", "Z"]}})",
+                           mode));
     const ImageLayer& shadow = layer(image, "shadow.sun");
     const layout::SplatCamera& c = frame.view;
     int dark = 0, lit = 0;
@@ -192,7 +209,7 @@ TEST_F(Picture, TheMediumsShadowOnASolidIsItsTransmittanceThere) {
         const double q = (point.x * point.x + point.y * point.y) / 0.64;
         const double expected = q < 1 ? std::exp(-1.3 * (1 - q) * (1 - q)) : 1;
         ASSERT_NEAR(value, expected, 0.02) << x << ' ' << y;  // one ray of the pixel, not its centre
-        dark += expected < 0.5, lit += expected > 0.99;
+        dark += expected<0.5, lit += expected> 0.99;
       }
     EXPECT_GT(dark, 50);
     EXPECT_GT(lit, 100);
@@ -203,15 +220,17 @@ TEST_F(Picture, SolidsShadowParticlesAndEachOtherAsFarAsTheyMay) {
   one({0, 0, -1}, 0.3f, 0.5f);
   writeBytes(folder.file("wall.obj"), "v -3 -3 -2\nv 3 -3 -2\nv 3 3 -2\nv -3 3 -2\nf 1 2 3 4\n");
   const auto radiance = [&](const std::string& block, const std::string& more = "") {
-    return render(std::string(kCamera) + kSun + kPeak + more +
-                  R"("solids": [)" + block + R"({"name": "wall", "file": "wall.obj"}],
+    return render(std::string(kCamera) + kSun + kPeak + more + R"("solids": [)" + block +
+                  R"({"name": "wall", "file": "wall.obj"}],
                      "output": {"size": [41, 41], "aovs": ["lights", "shadow"]})");
   };
   const auto block = [](const char* keys) {
-    return fmt::format(R"({{"name": "block", "file": "square.obj", "translate": [0, 0, 1], "mode": "hidden"{}}},)", keys);
+    return fmt::format(R"({{"name": "block", "file": "square.obj", "translate": [0, 0, 1], "mode": "hidden"{}}},)",
+                       keys);
   };
   const std::size_t centre = 20 * 41 + 20;
-  const Image open = radiance(""), hidden = radiance(block("")), passing = radiance(block(R"(, "casts_shadows": false)"));
+  const Image open = radiance(""), hidden = radiance(block("")),
+              passing = radiance(block(R"(, "casts_shadows": false)"));
   EXPECT_GT(open.at(20, 20).x, 0.1f);
   EXPECT_EQ(vec3(hidden.at(20, 20)), vec3(0));  // particle and wall lie in the shadow of what is not seen
   EXPECT_EQ(layer(hidden, "shadow.sun").values[centre], 0);
@@ -289,10 +308,11 @@ TEST_F(Picture, LightLayersOfAPlainSceneSumToTheBeautyToo) {
 }
 
 TEST_F(Picture, SolidsMoveOnThePictureWithTheCamera) {
-  const Image image = render(R"("camera": {"position": [0, 0, 4], "target": [0, 0, 0], "fov": 33.39849, "keys": [
+  const Image image =
+      render(R"("camera": {"position": [0, 0, 4], "target": [0, 0, 0], "fov": 33.39849, "keys": [
                                   {"frame": 0, "position": [-0.5, 0, 4], "target": [-0.5, 0, 0]}, {"frame": 2, "position": [0.5, 0, 4], "target": [0.5, 0, 0]}]},)" +
-                             std::string(kSun) + kPeak +
-                             R"("solids": [{"name": "s", "file": "square.obj"}], "output": {"size": [40, 40], "aovs": ["velocity"]})");
+             std::string(kSun) + kPeak +
+             R"("solids": [{"name": "s", "file": "square.obj"}], "output": {"size": [40, 40], "aovs": ["velocity"]})");
   const vec2 velocity = image.velocity[20 * 40 + 20];
   EXPECT_NEAR(velocity.x, -0.5 / (4 * double(frame.view.pixelSize)), 0.01);
   EXPECT_NEAR(velocity.y, 0, 0.01);

@@ -53,7 +53,7 @@ TEST(Mesh, ReadsObjFilesWithQuadsAndWithout) {
   const Mesh spot = sharedMesh("spot.obj");
   EXPECT_EQ(spot.triangles.size(), 5856u);
   expectBounds(spot, {-0.47155f, -0.73678f, -0.66891f}, {0.47155f, 0.95365f, 1.049f}, 1e-5f);  // the file's digits
-  ASSERT_EQ(spot.normal.size(), spot.position.size());  // smooth ones were made
+  ASSERT_EQ(spot.normal.size(), spot.position.size());                                         // smooth ones were made
   const Mesh suzanne = sharedMesh("suzanne.obj");
   EXPECT_GT(suzanne.triangles.size(), 900u);  // 500 faces, nearly all of them quads
   expectBounds(suzanne, {-3.8613f, 0.26731f, 3.2523f}, {-1.1269f, 2.2361f, 4.9555f}, 1e-4f);
@@ -75,9 +75,9 @@ TEST(Mesh, MakesNormalsThatKeepSharpEdges) {
   const Mesh cube = loadMesh(cubeSolid, 1);
   ASSERT_EQ(cube.triangles.size(), 12u);
   for (const auto& [a, b, c] : cube.triangles) {
-    const vec3 face = glm::normalize(glm::cross(cube.position[b] - cube.position[a], cube.position[c] - cube.position[a]));
-    for (const std::uint32_t corner : {a, b, c})
-      EXPECT_LE(glm::length(cube.normal[corner] - face), 1e-5f);
+    const vec3 face =
+        glm::normalize(glm::cross(cube.position[b] - cube.position[a], cube.position[c] - cube.position[a]));
+    for (const std::uint32_t corner : {a, b, c}) EXPECT_LE(glm::length(cube.normal[corner] - face), 1e-5f);
   }
 }
 

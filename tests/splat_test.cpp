@@ -120,8 +120,7 @@ bool sameBytes(const Image& a, const Image& b) {
          std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(vec4)) == 0;
 }
 
-// ---- camera
-// -----------------------------------------------------------------------------------------------------------
+// ---- camera ----
 
 TEST(SplatCamera, LooksAtTheTargetWithUpUpwardsAndRightToTheRight) {
   const SplatCamera c =
@@ -170,8 +169,7 @@ TEST(SplatCamera, MatricesPutPointsWhereTheRasteriserDoes) {
   }
 }
 
-// ---- footprint
-// --------------------------------------------------------------------------------------------------------
+// ---- footprint ----
 
 TEST(Footprint, OneMinusExpKeepsItsDigitsFromTinyToHuge) {
   double worst = 0;
@@ -233,8 +231,7 @@ TEST(Footprint, BoundsHoldEveryPixelThatTheOracleSees) {
   }
 }
 
-// ---- one particle
-// -----------------------------------------------------------------------------------------------------
+// ---- one particle ----
 
 TEST(Rasterize, OneParticleMatchesTheDoublePrecisionOracle) {
   double worst = 0, worstAlpha = 0;
@@ -324,8 +321,7 @@ TEST(Rasterize, ScreenFillingParticleAndCameraInsideTheSupportAreRight) {
   RecordProperty("worstShareOfTolerance", std::to_string(worst));
 }
 
-// ---- sub-pixel particles
-// ----------------------------------------------------------------------------------------------
+// ---- sub-pixel particles ----
 
 /// ∫ 1 − e^(−τ) over the unit disc / π, by the midpoint rule in q (b·db = ½·dq): 20,000 steps, error below 1e-6.
 double meanOpacity(double peak, uint kind) {
@@ -395,8 +391,7 @@ TEST(Rasterize, TotalOpacityOfASubPixelParticleDoesNotDependOnTheResolution) {
   }
 }
 
-// ---- many particles
-// ---------------------------------------------------------------------------------------------------
+// ---- many particles ----
 
 TEST(Rasterize, BlendsOverInTheOrderGiven) {
   const SplatCamera camera = cameraAtOrigin(100, 60);

@@ -57,7 +57,8 @@ LightDifference compareLight(const Frame& frame, std::size_t light, const Side& 
     if (!std::isfinite(delta)) delta = std::numeric_limits<double>::infinity();  // not a number on either side
     difference.transmittance += a[slot] / static_cast<double>(a.size());
     difference.mean += delta / static_cast<double>(a.size());
-    if (delta > difference.worst) difference.worst = delta, difference.particle = frame.density.source()[slot % frame.density.source().size()];
+    if (delta > difference.worst)
+      difference.worst = delta, difference.particle = frame.density.source()[slot % frame.density.source().size()];
   }
   return difference;
 }

@@ -9,13 +9,14 @@ set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.."
 
 plume=scenes/plume.json cloud=scenes/cloud.json
+near="--set /camera/position=[-0.05,0.97,3.75] --set /camera/target=[-0.05,-0.06,0]"  # than the fitted camera
 # NAME | SCENE | CAPTION | FLAGS
 gallery=(
   "still|scenes/gallery/lens.json|Figure 21, left: a still plume|"
   "motion_blur|scenes/gallery/lens.json|Figure 21, centre: motion blur, particles and camera move|--set /camera/shutter=[-0.12,0.12]"
   "depth_of_field|scenes/gallery/lens.json|Figure 21, right: depth of field|--set /camera/aperture_radius=0.12"
   "plume|$plume|Figure 26: smoke plume, 350,000 particles|"
-  "cloud|$cloud|Figure 27: cloud, 9,000,000 particles|--set /particles/0/count=9000000"
+  "cloud|$cloud|Figure 27: cloud, 9,000,000 particles|$near --set /particles/0/count=9000000"
   "size_1|$plume|Figure 28: drawn at a quarter of the size, same lighting|--set /view/radius_scale=0.25"
   "size_2|$plume|Figure 28: at half the size|--set /view/radius_scale=0.5"
   "size_3|$plume|Figure 28: at twice the size|--set /view/radius_scale=2"
@@ -24,9 +25,9 @@ gallery=(
   "density_2|$plume|Figure 29: mean optical depth 3|--set /medium/optical_depth=3"
   "density_3|$plume|Figure 29: mean optical depth 9|--set /medium/optical_depth=9"
   "density_4|$plume|Figure 29: mean optical depth 27|--set /medium/optical_depth=27"
-  "subsample_100|$cloud|Figure 30: 3,000,000 particles, all of them in the octree|--set /particles/0/count=3000000"
-  "subsample_50|$cloud|Figure 30: 50 % in the octree|--set /particles/0/count=3000000 --set /lighting/subsample=0.5"
-  "subsample_10|$cloud|Figure 30: 10 % in the octree|--set /particles/0/count=3000000 --set /lighting/subsample=0.1"
+  "subsample_100|$cloud|Figure 30: 3,000,000 particles, all of them in the octree|$near --set /particles/0/count=3000000"
+  "subsample_50|$cloud|Figure 30: 50 % in the octree|$near --set /particles/0/count=3000000 --set /lighting/subsample=0.5"
+  "subsample_10|$cloud|Figure 30: 10 % in the octree|$near --set /particles/0/count=3000000 --set /lighting/subsample=0.1"
   "solid_on_medium|scenes/gallery/louvre.json|Figure 32: a solid shadows the medium|"
   "medium_on_solid|scenes/gallery/ground.json|Figure 33: the medium shadows a solid|"
   "smoke1|scenes/gallery/smoke1.json|Real smoke (OpenVDB's sample smoke1) with the mesh spot in it|"
@@ -90,7 +91,7 @@ for entry in "${gallery[@]}"; do
   "$mote" render "$scene" --size 960x540 -o "$out/$name.exr" --preview "$out/$name.png" --stats "$out/$name.json" \
     $flags $(shrink "$scene" "$flags")
   printf '%s %.1f\n' "$name" "$(echo "$(date +%s.%N) $from" | awk '{print $1 - $2}')" >>"$seconds_file"
-  sheet+=(-label "$caption" "$out/$name.png")
+  sheet+=(-label "${caption//%/%%}" "$out/$name.png")
 done
 montage -background '#202020' -fill '#dddddd' -pointsize 11 -tile 4x -geometry 320x180+6+6 "${sheet[@]}" "$out/sheet.png"
 printf 'gallery: %s, seconds a picture in %s\n' "$out/sheet.png" "$seconds_file"
@@ -105,7 +106,7 @@ if [[ $docs -eq 1 ]]; then
       [[ -e "$out/$name.png" ]] || continue
       convert "$out/$name.png" -resize 480x270 -strip -quality 88 "docs/gallery/$name.jpg"
       printf '\n## %s\n\n![%s](%s.jpg)\n\n    mote render %s%s --size 960x540 -o %s.exr\n\n%s s\n' "$caption" "$caption" "$name" \
-        "$scene" "${flags:+ $flags}" "$name" "$(awk -v n="$name" '$1 == n {print $2}' "$seconds_file")"
+        "$scene" "$(sed -E "s/--set ([^ ]*\[[^ ]*)/--set '\1'/g" <<<"${flags:+ $flags}")" "$name" "$(awk -v n="$name" '$1 == n {print $2}' "$seconds_file")"
     done
   } >docs/gallery/README.md
 fi

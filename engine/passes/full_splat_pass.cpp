@@ -29,9 +29,9 @@ GraphicsPipelineInfo pipelineInfo(std::span<const std::uint32_t> fragment, std::
 }
 
 GraphicsPipelineInfo layersInfo() {
-  GraphicsPipelineInfo info =
-      pipelineInfo(spirv::splat_layers_frag,
-                   {{kNumberFormat, Blend::Min}, {kNumberFormat, Blend::Add}, {kColorFormat, Blend::PremultipliedOver}});
+  GraphicsPipelineInfo info = pipelineInfo(
+      spirv::splat_layers_frag,
+      {{kNumberFormat, Blend::Min}, {kNumberFormat, Blend::Add}, {kColorFormat, Blend::PremultipliedOver}});
   info.constants = {{kDepthAlphaId, std::bit_cast<std::uint32_t>(kDepthAlpha)},
                     {kNoDepthId, std::bit_cast<std::uint32_t>(kNoDepth)}};
   return info;
@@ -94,7 +94,8 @@ void FullSplatPass::drawInto(const GraphicsPipeline& pipeline, std::span<const I
       if (targets.size() == 1)
         commands.beginRendering({{targets[0], clear[0], keep}});
       else
-        commands.beginRendering({{targets[0], clear[0], keep}, {targets[1], clear[1], keep}, {targets[2], clear[2], keep}});
+        commands.beginRendering(
+            {{targets[0], clear[0], keep}, {targets[1], clear[1], keep}, {targets[2], clear[2], keep}});
       if (part > 0) commands.drawIndexed(pipeline, params, order, part, first);
       commands.endRendering();
       queries.end(commands, span);

@@ -69,8 +69,7 @@ Image readPng(const std::string& path, PngValues values) {
   constexpr png_uint_32 kMost = 16384;
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
-  if (!png_image_begin_read_from_file(&png, path.c_str()))
-    throw InputError(path, "", "a PNG picture", png.message);
+  if (!png_image_begin_read_from_file(&png, path.c_str())) throw InputError(path, "", "a PNG picture", png.message);
   if (png.width > kMost || png.height > kMost) {
     png_image_free(&png);
     throw InputError(path, "", fmt::format("at most {0} × {0} pixels", kMost),

@@ -133,8 +133,7 @@ std::vector<float> lineOpticalDepths(const Octree& tree, std::span<const vec3> p
 }
 
 void addInScattering(const Receivers& receivers, std::span<const float> radius, const layout::Light& light,
-                     std::span<const float> transmittance, const Scattering& scattering,
-                     std::vector<vec3>& radiance) {
+                     std::span<const float> transmittance, const Scattering& scattering, std::vector<vec3>& radiance) {
   const std::size_t count = receivers.size();
   MOTE_CHECK(radius.size(), ==, count);
   MOTE_CHECK(radiance.size(), ==, count);

@@ -73,7 +73,6 @@ struct Scattering {
 /// `radius`: of each receiver, the least distance from the light that counts (irradiance.h). `transmittance`: one or
 /// three channels, of all that stands in the light's way.
 void addInScattering(const Receivers& receivers, std::span<const float> radius, const layout::Light& light,
-                     std::span<const float> transmittance, const Scattering& scattering,
-                     std::vector<vec3>& radiance);
+                     std::span<const float> transmittance, const Scattering& scattering, std::vector<vec3>& radiance);
 
 }  // namespace mote

@@ -58,8 +58,8 @@ void setShaft(Packet& packet, const PacketRules& rules) {
                                                    : -kInfinity;
   // Rays may also start beyond a light that stands among the receivers.
   packet.lastStep = std::isinf(packet.axisLength) ? kInfinity
-                    : packet.axisLength > 0      ? std::max(1.0f, packet.ahead / packet.axisLength)
-                                                 : kInfinity;
+                    : packet.axisLength > 0       ? std::max(1.0f, packet.ahead / packet.axisLength)
+                                                  : kInfinity;
 }
 
 }  // namespace

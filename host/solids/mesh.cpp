@@ -5,14 +5,14 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <algorithm>
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <filesystem>
 #include <glm/gtc/matrix_transform.hpp>
-#include <algorithm>
+#include <limits>
 #include <numeric>
 #include <tuple>
-#include <limits>
 
 #include "host/core/error.h"
 #include "host/core/log.h"

@@ -96,7 +96,8 @@ class Tracer {
         const float weights[] = {wa, wb, wc};
         for (int k = 0; k < 3; ++k) {
           const vec3 tangent = side * mesh.normal[corners[k]];
-          result.start -= weights[k] * std::min(glm::dot(result.point - mesh.position[corners[k]], tangent), 0.0f) * tangent;
+          result.start -=
+              weights[k] * std::min(glm::dot(result.point - mesh.position[corners[k]], tangent), 0.0f) * tangent;
         }
       }
     }
@@ -256,9 +257,10 @@ Surfaces traceSurfaces(std::span<const Solid> solids, std::span<const Mesh> mesh
   std::vector<std::vector<Surface>> rows(static_cast<std::size_t>(result.height));
   parallelBlocks(rows.size(), 1, [&](std::size_t y, std::size_t) {
     for (int x = 0; x < result.width; ++x)
-      tracePixel(tracer, x, static_cast<int>(y),
-                 static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(result.width) + static_cast<std::uint32_t>(x),
-                 rows[y]);
+      tracePixel(
+          tracer, x, static_cast<int>(y),
+          static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(result.width) + static_cast<std::uint32_t>(x),
+          rows[y]);
   });
   std::size_t count = 0;
   for (const std::vector<Surface>& row : rows) count += row.size();

@@ -12,20 +12,20 @@
 
 namespace mote {
 
-constexpr int kSurfaceRays = 16;     ///< a pixel, at fixed places …
-constexpr int kEdgeRays = 64;        ///< … and where those do not all meet one surface: coverage in steps of 1/64
-constexpr int kSurfaceClasses = 4;   ///< surfaces of one pixel and what is beside them, together
-constexpr int kShadowPoints = 4;     ///< of one surface in a pixel: the edges of solids' shadows are smoothed with them
+constexpr int kSurfaceRays = 16;    ///< a pixel, at fixed places …
+constexpr int kEdgeRays = 64;       ///< … and where those do not all meet one surface: coverage in steps of 1/64
+constexpr int kSurfaceClasses = 4;  ///< surfaces of one pixel and what is beside them, together
+constexpr int kShadowPoints = 4;    ///< of one surface in a pixel: the edges of solids' shadows are smoothed with them
 
 /// One surface in one pixel.
 struct Surface {
-  std::uint32_t pixel;  ///< y · width + x
-  std::uint16_t solid;  ///< index into the scene's solids
-  std::uint16_t shadowPoints;                 ///< 1 … kShadowPoints
-  float coverage;                             ///< share of the pixel, 0 < coverage ≤ 1
-  float depth;                                ///< along the view axis, mean [scene units]
-  vec3 normal;                                ///< unit, of the side that faces the camera; smooth where the mesh is
-  std::array<vec3, kShadowPoints> points;     ///< beside the surface, where shadow rays may start; the first is lit
+  std::uint32_t pixel;                     ///< y · width + x
+  std::uint16_t solid;                     ///< index into the scene's solids
+  std::uint16_t shadowPoints;              ///< 1 … kShadowPoints
+  float coverage;                          ///< share of the pixel, 0 < coverage ≤ 1
+  float depth;                             ///< along the view axis, mean [scene units]
+  vec3 normal;                             ///< unit, of the side that faces the camera; smooth where the mesh is
+  std::array<vec3, kShadowPoints> points;  ///< beside the surface, where shadow rays may start; the first is lit
 };
 
 /// Every surface of the picture, in the order of pixels; within a pixel from the greatest coverage on.

@@ -13,8 +13,8 @@
 #include <bit>
 #include <cmath>
 
-#include "host/core/vec.h"
 #include "host/core/falloff.h"
+#include "host/core/vec.h"
 #include "shaders/glsl/layout/splat.h"
 
 namespace mote {

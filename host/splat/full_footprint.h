@@ -126,12 +126,12 @@ inline float profile(float q, float plateau, layout::uint kind) {
 
 /// How the ray of one pixel meets a splat.
 struct Crossing {
-  float profile;  ///< mean of the profile over the path, ≥ 0
-  float nearest;  ///< s of the closest approach
-  float q;        ///< … and the distance there
+  float profile;    ///< mean of the profile over the path, ≥ 0
+  float nearest;    ///< s of the closest approach
+  float q;          ///< … and the distance there
   float rayLength;  ///< √(1 + ε|at|²)
-  float closest;  ///< depth at which the ray passes the centre [scene units]
-  vec2 offset;    ///< of the pixel from the middle, in image coordinates
+  float closest;    ///< depth at which the ray passes the centre [scene units]
+  vec2 offset;      ///< of the pixel from the middle, in image coordinates
 };
 
 /// One of the two parts of the path: its width times the mean of the profile over it.

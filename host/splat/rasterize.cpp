@@ -8,8 +8,8 @@
 namespace mote {
 namespace {
 
-/// Particles whose splats are kept at once (72 bytes each); with the pairs of tile_bins.h 150 MB beside the picture. The
-/// result does not depend on it.
+/// Particles whose splats are kept at once (72 bytes each); with the pairs of tile_bins.h 150 MB beside the picture.
+/// The result does not depend on it.
 constexpr std::size_t kBatch = std::size_t{1} << 18;
 
 /// An empty rectangle where the particle cannot be seen.

@@ -34,11 +34,14 @@ FullSplat makeFullSplat(const SplatSet& set, layout::uint particle, bool withVel
 /// One splat over the pixels of one tile.
 void drawSplat(const SplatSet& set, const FullSplat& s, const Tiling& tiling, std::size_t tile,
                std::span<const float> surfaces, Image& image) {
-  const int left = std::max<int>(s.left, tiling.left(tile)), right = std::min<int>(s.right, tiling.left(tile) + kTileWidth);
-  const int top = std::max<int>(s.top, tiling.top(tile)), bottom = std::min<int>(s.bottom, tiling.top(tile) + kTileHeight);
+  const int left = std::max<int>(s.left, tiling.left(tile)),
+            right = std::min<int>(s.right, tiling.left(tile) + kTileWidth);
+  const int top = std::max<int>(s.top, tiling.top(tile)),
+            bottom = std::min<int>(s.bottom, tiling.top(tile) + kTileHeight);
   for (int y = top; y < bottom; ++y)
     for (int x = left; x < right; ++x) {
-      const std::size_t pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
+      const std::size_t pixel =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
       const float surface = surfaces.empty() ? kNoDepth : surfaces[pixel];
       if (surface == layout::kPixelLeftOut) continue;
       SplatSample sample;

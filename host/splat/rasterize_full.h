@@ -1,5 +1,6 @@
-// The reference rasteriser of full splats on TBB: lens, shutter, orthographic and anamorphic cameras, colours, emission,
-// sprites, surfaces, layers. What needs none of these is drawn by rasterize() of splat.h, several times faster.
+// The reference rasteriser of full splats on TBB: lens, shutter, orthographic and anamorphic cameras, colours,
+// emission, sprites, surfaces, layers. What needs none of these is drawn by rasterize() of splat.h, several times
+// faster.
 #pragma once
 #include <span>
 
@@ -9,8 +10,8 @@
 namespace mote {
 
 /// Draws the particles in the order given, each over what is there. `surfaces`: the depth of an opaque surface at each
-/// pixel, row by row, that hides what lies behind it (kNoDepth: none; layout::kPixelLeftOut: nothing is drawn there); empty:
-/// none anywhere.
+/// pixel, row by row, that hides what lies behind it (kNoDepth: none; layout::kPixelLeftOut: nothing is drawn there);
+/// empty: none anywhere.
 ///
 /// The picture's layers: depth (Z) as in splat.h, of the medium alone; optical depth, summed over all splats before the
 /// surface; velocity of the splats' centres with the camera's, averaged over what is seen, weighted by what it adds to

@@ -30,8 +30,8 @@ constexpr float kDepthAlpha = 1e-3f;
 /// 2 is the least that keeps the default falloff within 2 % for τ ≤ 1. splat_test measures its row through rasterize().
 constexpr float kMinSplatRadius = 2.0f;
 
-/// Camera space and image plane of a perspective camera with square pixels and everything sharp. `fov` vertical [degrees]; `up` not parallel to the view.
-/// Throws InputError where target or up leave the view undefined.
+/// Camera space and image plane of a perspective camera with square pixels and everything sharp. `fov` vertical
+/// [degrees]; `up` not parallel to the view. Throws InputError where target or up leave the view undefined.
 layout::SplatCamera makeSplatCamera(const vec3& position, const vec3& target, const vec3& up, float fov, float near,
                                     float far, int width, int height, layout::uint falloff);
 
@@ -60,10 +60,10 @@ float depthKeyScale(const Bounds& centres, const vec3& camera);
 std::vector<layout::uint> sortByDepth(std::span<const layout::SplatParticle> particles,
                                       const layout::SplatCamera& camera, float scale);
 
-/// Draws the particles of a perspective camera with square pixels in the order given (indices into `particles`), each α·radiance *over* what is there. Results do
-/// not depend on the number of threads nor on the CPU's instruction set, bit for bit. Memory: the picture and at most
-/// 150 MB. A million splats of 4 pixels' radius take about half a second of one core with AVX-512,
-/// spread over all cores.
+/// Draws the particles of a perspective camera with square pixels in the order given (indices into `particles`), each
+/// α·radiance *over* what is there. Results do not depend on the number of threads nor on the CPU's instruction set,
+/// bit for bit. Memory: the picture and at most 150 MB. A million splats of 4 pixels' radius take about half a second
+/// of one core with AVX-512, spread over all cores.
 Image rasterize(std::span<const layout::SplatParticle> particles, std::span<const layout::uint> order,
                 const layout::SplatCamera& camera, bool withDepth);
 

@@ -21,7 +21,7 @@ inline Texels texelsAt(const vec2& point, layout::uint width, layout::uint heigh
   const float y = std::min(std::max((0.5f - 0.5f * point.y) * static_cast<float>(height) - 0.5f, 0.0f), lastY);
   const auto left = static_cast<layout::uint>(x), top = static_cast<layout::uint>(y);
   const layout::uint right = std::min(left + 1, width - 1), bottom = std::min(top + 1, height - 1);
-  return {top * width + left,    top * width + right,           bottom * width + left,
+  return {top * width + left,     top * width + right,          bottom * width + left,
           bottom * width + right, x - static_cast<float>(left), y - static_cast<float>(top)};
 }
 

@@ -43,7 +43,7 @@ double spike(const std::vector<std::string>& settings) {
     "output": {{"file": "orbit.####.exr", "size": [128, 96], "precision": "float"}},
     "frames": {{"first": 1, "last": {}}}
   }})",
-                                                   orbitKeys(), kFrames));
+                                                    orbitKeys(), kFrames));
   std::vector<std::string> arguments{"render", folder.file("orbit.json"), "--lighting", "cpu", "--raster", "cpu"};
   for (const std::string& setting : settings) arguments.insert(arguments.end(), {"--set", setting});
   const ProcessResult result = mote(arguments, kWithoutVulkan);

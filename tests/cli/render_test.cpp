@@ -182,6 +182,18 @@ TEST_F(MoteRender, PutsCameraFrameAndStatisticsIntoTheHeader) {
   EXPECT_TRUE(found) << "no attribute holds the statistics";
 }
 
+TEST_F(MoteRender, WritesThePixelAspectIntoTheHeader) {
+  makeBall(folder_);
+  ASSERT_EQ(render({"-o", folder_.file("out.exr"), "--set", "/output/pixel_aspect=2"}).exitCode, 0);
+  const std::string bytes = readBytes(folder_.file("out.exr"));
+  const std::string name("pixelAspectRatio\0float\0", 23);  // then its size, 4 bytes, then the number
+  const std::size_t at = bytes.find(name);
+  ASSERT_NE(at, std::string::npos);
+  float aspect = 0;
+  std::memcpy(&aspect, bytes.data() + at + name.size() + 4, sizeof aspect);
+  EXPECT_EQ(aspect, 2);
+}
+
 // ---- bad scenes ----
 
 TEST_F(MoteRender, RefusesAMissingScene) {
@@ -193,6 +205,29 @@ TEST_F(MoteRender, RefusesAMissingScene) {
 }
 
 TEST_F(MoteRender, RefusesAMissingParticleFile) { expectRefusal(folder_.file("ball.prt")); }
+
+TEST_F(MoteRender, RefusesAMissingSprite) {
+  makeBall(folder_);
+  writeBytes(folder_.file("puff.png"), "not a picture");
+  expectRefusal("/view/sprite_color: expected a PNG or EXR picture, got " + folder_.file("pufff.png"),
+                {"--set", R"(/view/sprite_color="pufff.png")"});
+  expectRefusal("'puff.png'", {"--set", R"(/view/sprite_color="pufff.png")"});
+}
+
+TEST_F(MoteRender, RefusesASpriteThatIsNoPicture) {
+  makeBall(folder_);
+  writeBytes(folder_.file("puff.png"), "not a picture");
+  writeBytes(folder_.file("puff.exr"), "not a picture");
+  expectRefusal(folder_.file("puff.png"), {"--set", R"(/view/sprite_opacity="puff.png")"});
+  expectRefusal(folder_.file("puff.exr"), {"--set", R"(/view/sprite_opacity="puff.exr")"});
+}
+
+TEST_F(MoteRender, RefusesASolidThatIsMissingOrHasNoTriangles) {
+  makeBall(folder_);
+  writeBytes(folder_.file("wall.obj"), "v 0 0 0\nv 1 0 0\n");
+  expectRefusal(folder_.file("wal.obj") + ": expected a mesh, got no such file", {"--set", R"(/solids=[{"file": "wal.obj"}])"});
+  expectRefusal(folder_.file("wall.obj"), {"--set", R"(/solids=[{"file": "wall.obj"}])"});
+}
 
 TEST_F(MoteRender, RefusesAnUnknownKeyWithItsLine) {
   makeBall(folder_);

@@ -45,8 +45,8 @@ inline double oracleOpticalDepth(const Octree& tree, std::size_t slot, const lay
   double depth = 0;
   for (std::size_t j = 0; j < tree.particleCount(); ++j)
     if (j != slot)
-      depth += tree.peak[j] * oracleShare(dvec3(tree.position(j)) - origin, direction, length, tree.radius[j], falloff,
-                                          endpoint);
+      depth += tree.peak[j] *
+               oracleShare(dvec3(tree.position(j)) - origin, direction, length, tree.radius[j], falloff, endpoint);
   return depth;
 }
 
