@@ -483,7 +483,8 @@ TEST(Png, RefusesWhatIsNoWholePicture) {
   EXPECT_THROW(readPng(folder.file("gone.png"), PngValues::Data), InputError);
   writeRgbaPng(folder.file("a.png"), std::vector<std::uint8_t>(4 * 64 * 64, 77), 64, 64);
   const std::string bytes = readBytes(folder.file("a.png"));
-  for (const std::size_t length : {std::size_t{0}, std::size_t{7}, std::size_t{20}, std::size_t{40}, bytes.size() / 2}) {
+  for (const std::size_t length :
+       {std::size_t{0}, std::size_t{7}, std::size_t{20}, std::size_t{40}, bytes.size() / 2}) {
     writeBytes(folder.file("b.png"), bytes.substr(0, length));
     EXPECT_THROW(readPng(folder.file("b.png"), PngValues::Data), InputError) << length << " bytes";
   }

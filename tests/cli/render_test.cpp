@@ -225,7 +225,8 @@ TEST_F(MoteRender, RefusesASpriteThatIsNoPicture) {
 TEST_F(MoteRender, RefusesASolidThatIsMissingOrHasNoTriangles) {
   makeBall(folder_);
   writeBytes(folder_.file("wall.obj"), "v 0 0 0\nv 1 0 0\n");
-  expectRefusal(folder_.file("wal.obj") + ": expected a mesh, got no such file", {"--set", R"(/solids=[{"file": "wal.obj"}])"});
+  expectRefusal(folder_.file("wal.obj") + ": expected a mesh, got no such file",
+                {"--set", R"(/solids=[{"file": "wal.obj"}])"});
   expectRefusal(folder_.file("wall.obj"), {"--set", R"(/solids=[{"file": "wall.obj"}])"});
 }
 
