@@ -14,7 +14,7 @@ near="--set /camera/position=[-0.05,0.97,3.75] --set /camera/target=[-0.05,-0.06
 gallery=(
   "still|scenes/gallery/lens.json|Figure 21, left: a still plume|"
   "motion_blur|scenes/gallery/lens.json|Figure 21, centre: motion blur, particles and camera move|--set /camera/shutter=[-0.12,0.12]"
-  "depth_of_field|scenes/gallery/lens.json|Figure 21, right: depth of field|--set /camera/aperture_radius=0.12"
+  "depth_of_field|scenes/gallery/lens.json|Figure 21, right: depth of field|--set /camera/aperture_radius=0.2"
   "plume|$plume|Figure 26: smoke plume, 350,000 particles|"
   "cloud|$cloud|Figure 27: cloud, 9,000,000 particles|$near --set /particles/0/count=9000000"
   "size_1|$plume|Figure 28: drawn at a quarter of the size, same lighting|--set /view/radius_scale=0.25"
