@@ -4,12 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 
 #include "host/core/parallel.h"
 #include "host/core/random.h"
-#include "host/lighting/kernel.h"
+#include "host/lighting/beam_kernel.h"
+#include "host/lighting/beams.h"
 #include "host/lighting/medium.h"
-#include "host/lighting/ray_order.h"
 #include "tests/support/lighting_oracle.h"
 #include "tests/support/lights.h"
 
@@ -201,13 +202,72 @@ TEST(Lighting, InScatteringFollowsTheInverseSquareAndTheIsotropicPhase) {
   }
 }
 
-TEST(RayOrder, TakesEverySlotOnce) {
-  const Octree tree = ballCloud(10001, 18, 0.1, 0.1).tree(0, true, 1);
-  for (const layout::Light& light : {pointLight({0, 0, 0}), pointLight({5, 0, 0}), directionalLight({0, 0, 1})}) {
-    std::vector<std::uint32_t> order = rayOrder(slotsOf(tree), light);
+TEST(Beams, TakeEverySlotOnceInBeamsOfColumns) {
+  Cloud cloud = ballCloud(30001, 18, 0.1, 0.1);
+  for (std::size_t i = 0; i < 5000; ++i) cloud.position[i] = {0.5f, 0.5f, 0.5f};  // no cut parts these
+  const Octree tree = cloud.tree(0, true, 1);
+  const vec3 own = tree.position(7);
+  for (const layout::Light& light : {pointLight({0, 0, 0}), pointLight({50, 0, 0}), pointLight(own),
+                                     pointLight({1e6f, 1e6f, -3e5f}), directionalLight({0, 0, 1})}) {
+    const Beams beams = planBeams(slotsOf(tree), light, {}, tree.meanRadius);
+    std::vector<std::uint32_t> order = beams.receiver;
     std::sort(order.begin(), order.end());
-    ASSERT_EQ(order.size(), 10001u);
-    for (std::uint32_t i = 0; i < order.size(); ++i) ASSERT_EQ(order[i], i);
+    std::vector<std::uint32_t> expected(30001);
+    std::iota(expected.begin(), expected.end(), 0u);
+    if (light.position == own && light.type == layout::kLightPoint) expected.erase(expected.begin() + 7);
+    ASSERT_EQ(order, expected);
+    ASSERT_EQ(beams.column.front(), 0u);
+    ASSERT_EQ(beams.column.back() + 1, beams.start.size());
+    ASSERT_EQ(beams.start.back(), beams.receiver.size());
+    for (std::size_t c = 0; c < beams.columns(); ++c) {
+      ASSERT_LT(beams.column[c], beams.column[c + 1]);
+      ASSERT_LE(beams.ofColumn(c).size(), kColumnRays);
+      for (std::size_t b = beams.column[c]; b < beams.column[c + 1]; ++b) {
+        ASSERT_LT(beams.start[b], beams.start[b + 1]);
+        ASSERT_LE(beams.ofBeam(b).size(), kBeamRays + kBeamRays / 4);
+      }
+    }
+  }
+}
+
+TEST(Column, FindsEveryParticleThatARayMeetsInTheOrderOfReach) {
+  const Cloud cloud = ballCloud(5000, 20, 0.01, 0.2);
+  const Octree tree = cloud.tree(0, true, 1);
+  for (const layout::Light& light : {pointLight({0.2f, 0, 0}), pointLight({3, 1, 0}), directionalLight({1, 2, 3})}) {
+    const Receivers receivers = slotsOf(tree);
+    const ColumnRules rules = columnRules(tree, light, receivers.bounds());
+    const Beams beams = planBeams(receivers, light, {}, tree.meanRadius);
+    std::size_t met = 0;
+    Column column;
+    Beam beam;
+    for (std::size_t c = 0; c < beams.columns(); ++c) {
+      column.setRays(receivers, light, beams.ofColumn(c), rules);
+      simdBeamKernel().gather(tree, column);
+      simdBeamKernel().place(column);
+      column.sort(1);
+      const auto& reach = column.sorted.reach;
+      ASSERT_TRUE(std::is_sorted(reach.begin(), reach.begin() + static_cast<std::ptrdiff_t>(column.sorted.count)));
+      for (std::size_t b = beams.column[c]; b < beams.column[c + 1]; ++b) {
+        beam.setRays(column, receivers, beams.ofBeam(b));
+        simdBeamKernel().choose(column, 1, beam);
+        std::vector<bool> chosen(tree.particleCount(), false);
+        for (std::size_t k = 0; k < beam.particles.count; ++k)
+          chosen[column.gathered.slot[beam.particles.index[k]]] = true;
+        for (const std::uint32_t index : column.nearLight) chosen[column.gathered.slot[index]] = true;
+        const std::uint32_t ray = beams.ofBeam(b).front();
+        const dvec3 origin(tree.position(ray));
+        const bool point = light.type == layout::kLightPoint;
+        const dvec3 toLight = point ? dvec3(light.position) - origin : -dvec3(light.direction);
+        for (std::size_t j = 0; j < tree.particleCount(); ++j) {
+          const double share =
+              oracleShare(dvec3(tree.position(j)) - origin, glm::normalize(toLight),
+                          point ? glm::length(toLight) : INFINITY, tree.radius[j], 0, layout::kEndpointSoft);
+          met += share > 0;
+          ASSERT_TRUE(share <= 0 || chosen[j]) << "light " << light.type << " ray " << ray << " particle " << j;
+        }
+      }
+    }
+    EXPECT_GT(met, 100u);
   }
 }
 

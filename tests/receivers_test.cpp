@@ -5,11 +5,11 @@
 
 #include "host/core/parallel.h"
 #include "host/core/random.h"
+#include "host/lighting/beam_kernel.h"
+#include "host/lighting/beams.h"
 #include "host/lighting/irradiance.h"
-#include "host/lighting/kernel.h"
 #include "host/lighting/lighting.h"
 #include "host/lighting/medium.h"
-#include "host/lighting/ray_order.h"
 #include "tests/support/lighting_oracle.h"
 #include "tests/support/lights.h"
 
@@ -141,7 +141,7 @@ TEST(Receivers, TheSameForAnyNumberOfThreads) {
 
 TEST(Receivers, OnlyThoseReachedHaveRays) {
   const Scattered s(false);
-  const std::vector<std::uint32_t> order = rayOrder(s.receivers(), pointLight({2, 1, 0}), s.reached);
+  const std::vector<std::uint32_t> order = planBeams(s.receivers(), pointLight({2, 1, 0}), s.reached, 0.1).receiver;
   std::vector<std::uint8_t> seen(s.x.size(), 0);
   for (const std::uint32_t k : order) ++seen[k];
   EXPECT_EQ(seen, s.reached);

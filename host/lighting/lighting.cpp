@@ -4,47 +4,70 @@
 
 #include "host/core/error.h"
 #include "host/core/parallel.h"
+#include "host/lighting/beam_kernel.h"
+#include "host/lighting/beams.h"
 #include "host/lighting/irradiance.h"
-#include "host/lighting/kernel.h"
-#include "host/lighting/ray_order.h"
 
 namespace mote {
 namespace {
 
-/// Rays a task: long enough to hide the scheduling, short enough to balance the ends of a frame.
-constexpr std::size_t kTaskRays = 64 * kPacketRays;
+/// What one thread needs for the column and the beam at hand, kept from one to the next.
+struct Workspace {
+  Column column;
+  Beam beam;
+};
+Workspace& workspace() {
+  static thread_local Workspace ofThisThread;
+  return ofThisThread;
+}
 
-using Walk = void (*)(const Octree&, const WalkOptions&, Packet&);
-
-WalkOptions walkOptions(const layout::Light& light, const LightingOptions& options) {
+SumOptions sumOptions(const layout::Light& light, const LightingOptions& options) {
   return {options.falloff, options.endpoint, opticalDepthLimit(light, options)};
 }
 
-void storePacket(const Packet& packet, const std::uint32_t* indices, int count, std::size_t channels,
-                 std::size_t receivers, float* depths) {
-  for (std::size_t channel = 0; channel < channels; ++channel)
-    for (int lane = 0; lane < count; ++lane)
-      depths[channel * receivers + indices[lane]] =
-          packet.exactLength[lane] > 0 ? packet.opticalDepth[channel][lane] : 0.0f;
+/// Finds what lies in the way of a column that has been set.
+void fillColumn(const Octree& tree, const BeamKernel& kernel, Column& column) {
+  kernel.gather(tree, column);
+  kernel.place(column);
+  column.sort(tree.channels());
 }
 
-std::vector<float> walkAll(const Octree& tree, const Receivers& receivers, const layout::Light& light,
-                           const LightingOptions& options, std::span<const std::uint8_t> reached, const RaysDone& done,
-                           Walk walk) {
+/// Calls done(packet, sums) for each packet of a beam that has been set.
+template <class Done>
+void sumBeam(const Octree& tree, const BeamKernel& kernel, const SumOptions& options, Workspace& work,
+             const Done& done) {
+  kernel.choose(work.column, tree.channels(), work.beam);
+  PacketSums sums;
+  for (std::size_t packet = 0; packet < work.beam.rays.packets(); ++packet) {
+    kernel.sum(work.column, work.beam, packet, tree.channels(), options, sums);
+    done(packet, sums);
+  }
+}
+
+std::vector<float> sumAll(const Octree& tree, const Receivers& receivers, const layout::Light& light,
+                          const LightingOptions& options, std::span<const std::uint8_t> reached, const RaysDone& done,
+                          const BeamKernel& kernel) {
   if (!reached.empty()) MOTE_CHECK(reached.size(), ==, receivers.size());
   std::vector<float> depths(tree.channels() * receivers.size(), 0.0f);
   if (shadowless(light) || tree.particleCount() == 0) return depths;
-  const WalkOptions rules = walkOptions(light, options);
-  const PacketRules shape = packetRules(tree, receivers.bounds());
-  const std::vector<std::uint32_t> order = rayOrder(receivers, light, reached);
-  parallelBlocks(order.size(), kTaskRays, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t first = begin; first < end; first += kPacketRays) {
-      const int count = static_cast<int>(std::min<std::size_t>(kPacketRays, end - first));
-      Packet packet = makePacket(receivers, light, &order[first], count, shape);
-      walk(tree, rules, packet);
-      storePacket(packet, &order[first], count, tree.channels(), receivers.size(), depths.data());
+  const SumOptions rules = sumOptions(light, options);
+  const ColumnRules shape = columnRules(tree, light, receivers.bounds());
+  const Beams beams = planBeams(receivers, light, reached, tree.meanRadius);
+  parallelBlocks(beams.columns(), 1, [&](std::size_t c, std::size_t) {
+    Workspace& work = workspace();
+    work.column.setRays(receivers, light, beams.ofColumn(c), shape);
+    fillColumn(tree, kernel, work.column);
+    for (std::size_t b = beams.column[c]; b < beams.column[c + 1]; ++b) {
+      work.beam.setRays(work.column, receivers, beams.ofBeam(b));
+      const std::vector<std::uint32_t>& rays = work.beam.rays.receiver;
+      sumBeam(tree, kernel, rules, work, [&](std::size_t packet, const PacketSums& sums) {
+        const std::size_t first = packet * kPacketRays, count = std::min<std::size_t>(kPacketRays, rays.size() - first);
+        for (std::size_t channel = 0; channel < tree.channels(); ++channel)
+          for (std::size_t lane = 0; lane < count; ++lane)
+            depths[channel * receivers.size() + rays[first + lane]] = sums.of[channel][lane];
+      });
     }
-    if (done) done(end - begin);
+    if (done) done(beams.ofColumn(c).size());
   });
   return depths;
 }
@@ -74,17 +97,17 @@ float opticalDepthLimit(const layout::Light& light, const LightingOptions& optio
 std::vector<float> opticalDepths(const Octree& tree, const Receivers& receivers, const layout::Light& light,
                                  const LightingOptions& options, std::span<const std::uint8_t> reached,
                                  const RaysDone& done) {
-  return walkAll(tree, receivers, light, options, reached, done, walkSimd);
+  return sumAll(tree, receivers, light, options, reached, done, simdBeamKernel());
 }
 
 std::vector<float> opticalDepths(const Octree& tree, const layout::Light& light, const LightingOptions& options,
                                  const RaysDone& done) {
-  return walkAll(tree, slotsOf(tree), light, options, {}, done, walkSimd);
+  return sumAll(tree, slotsOf(tree), light, options, {}, done, simdBeamKernel());
 }
 
 std::vector<float> opticalDepthsScalar(const Octree& tree, const Receivers& receivers, const layout::Light& light,
                                        const LightingOptions& options, std::span<const std::uint8_t> reached) {
-  return walkAll(tree, receivers, light, options, reached, {}, walkScalar);
+  return sumAll(tree, receivers, light, options, reached, {}, scalarBeamKernel());
 }
 
 std::vector<float> opticalDepthsScalar(const Octree& tree, const layout::Light& light, const LightingOptions& options) {
@@ -116,17 +139,19 @@ std::vector<float> lineOpticalDepths(const Octree& tree, std::span<const vec3> p
                                      layout::uint falloff) {
   MOTE_CHECK(points.size(), ==, directions.size());
   std::vector<float> depths(points.size(), 0.0f);
-  const Bounds bounds = tree.bounds();
-  if (bounds.empty()) return depths;
-  const PacketRules shape = packetRules(tree, {});
-  const float away = 2 * glm::length(bounds.size());
+  if (tree.particleCount() == 0) return depths;
+  layout::Light endless{};
+  endless.type = layout::kLightDirectional;
+  const ColumnRules shape = columnRules(tree, endless, {});
   parallelBlocks(points.size(), 16, [&](std::size_t begin, std::size_t end) {
+    Workspace& work = workspace();
     for (std::size_t i = begin; i < end; ++i) {
-      // From a start outside everything, the ray is the whole line.
-      Packet packet = makeLinePacket(points[i] - away * directions[i], directions[i], shape);
-      walkSimd(tree, {falloff, layout::kEndpointSoft, std::numeric_limits<float>::infinity()}, packet);
-      const auto& sums = packet.opticalDepth;
-      depths[i] = tree.channels() == 1 ? sums[0][0] : (sums[0][0] + sums[1][0] + sums[2][0]) / 3;
+      work.column.setLine(points[i], directions[i], shape);
+      fillColumn(tree, simdBeamKernel(), work.column);
+      work.beam.setLine();
+      sumBeam(tree, simdBeamKernel(), {falloff}, work, [&](std::size_t, const PacketSums& sums) {
+        depths[i] = tree.channels() == 1 ? sums.of[0][0] : (sums.of[0][0] + sums.of[1][0] + sums.of[2][0]) / 3;
+      });
     }
   });
   return depths;

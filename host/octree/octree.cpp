@@ -76,6 +76,16 @@ float leastPositive(const std::vector<float>& values) {
   return least < std::numeric_limits<float>::max() ? least : 0;
 }
 
+double meanOf(const std::vector<float>& values, std::size_t count) {
+  std::vector<double> parts((count + kGrain - 1) / kGrain, 0.0);
+  parallelBlocks(count, kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) parts[begin / kGrain] += values[i];
+  });
+  double sum = 0;
+  for (const double part : parts) sum += part;
+  return count > 0 ? sum / static_cast<double>(count) : 0;
+}
+
 float below(float value) { return std::nextafter(value, -std::numeric_limits<float>::infinity()); }
 float above(float value) { return std::nextafter(value, std::numeric_limits<float>::infinity()); }
 
@@ -201,6 +211,7 @@ Octree buildOctree(const OctreeInput& input, std::uint32_t particlesPerCell) {
   const std::vector<CodedParticle> order = codedOrder(position);
   gatherSlots(tree, order, input);
   tree.leastRadius = leastPositive(tree.radius);
+  tree.meanRadius = meanOf(tree.radius, order.size());
   if (!order.empty()) TreeBuilder(tree, order, particlesPerCell).build(0, order.size(), tree.nodes);
   tree.nodes.push_back({vec3(std::numeric_limits<float>::infinity()), static_cast<layout::uint>(order.size()),
                         vec3(-std::numeric_limits<float>::infinity()),

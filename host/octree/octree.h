@@ -38,6 +38,7 @@ struct Octree {
   std::vector<float> peakGreen, peakBlue;  ///< … of the other colours, where they differ (peak is red then); else empty
   std::vector<std::uint32_t> source;       ///< slot → index in the input; not padded
   float leastRadius = 0;                   ///< smallest support radius above 0; 0 without particles
+  double meanRadius = 0;                   ///< of all support radii; 0 without particles
 
   /// 1: one sum serves all colours; 3: each has its own.
   std::size_t channels() const { return peakGreen.empty() ? 1 : 3; }

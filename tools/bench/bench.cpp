@@ -12,7 +12,7 @@
 #include "host/core/output_file.h"
 #include "host/core/parallel.h"
 #include "host/core/timer.h"
-#include "host/lighting/kernel.h"
+#include "host/lighting/beam_kernel.h"
 #include "tools/render.h"
 
 namespace mote {

@@ -1,5 +1,5 @@
-// mote bench lighting: a noise cloud lit by one point light: build of the octree, then the optical depths on TBB and in
-// the compute shader.
+// mote bench lighting: a noise cloud lit by one point light: build of the octree, then the exact optical depths on TBB
+// against plain packets (equal radii, and radii over a decade) and in the compute shader.
 #include <tbb/parallel_sort.h>
 
 #include <cmath>
@@ -13,6 +13,7 @@
 #include "host/particles/generate.h"
 #include "host/particles/spacing.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/plain_packets.h"
 
 namespace mote {
 namespace {
@@ -22,7 +23,9 @@ constexpr double kOpticalDepth = 4;            // as the default of a scene
 constexpr double kRounding = 2e-5;             // |ΔT| that is left without a cutoff, as in mote crosscheck
 constexpr std::uint64_t kScalarMost = 20'000;  // particles lit on the scalar path too: a fraction of a second
 
-constexpr double kMostBuildSeconds = 0.2, kLeastRays = 1.0, kMostRatio = 12;  // the floors
+constexpr double kRadiusRange = 10;  // greatest / least, where radii vary
+
+constexpr double kMostBuildSeconds = 0.2, kLeastRays = 1.0, kLeastAgainstPlain = 2.5, kMostRatio = 12;  // the floors
 
 /// What buildOctree takes.
 struct Cloud {
@@ -30,11 +33,15 @@ struct Cloud {
   std::vector<float> radius, peak;
 };
 
-Cloud makeCloud(std::uint64_t count, layout::uint falloff) {
+/// Radii of 1.5 spacings, or spread log-uniformly over a range about that.
+Cloud makeCloud(std::uint64_t count, layout::uint falloff, double range = 1) {
   ParticleSet set = generateParticles(Generator::Cloud, count, kSeed, 1);
   Cloud cloud;
   cloud.position = std::move(set.position);
-  cloud.radius.assign(count, static_cast<float>(kAutoRadiusFactor * meanNeighbourDistance(cloud.position)));
+  const double radius = kAutoRadiusFactor * meanNeighbourDistance(cloud.position);
+  cloud.radius.resize(count);
+  for (std::size_t i = 0; i < count; ++i)
+    cloud.radius[i] = static_cast<float>(radius * std::pow(range, uniformDouble(hashBits(kSeed, i, 1)) - 0.5));
   cloud.peak = peakOpticalDepths(set.density, cloud.radius, falloff, true, 1);
   const Octree tree = buildOctree(cloud.position, cloud.radius, cloud.peak);
   const auto scale = static_cast<float>(kOpticalDepth / meanLineOpticalDepth(tree, falloff));
@@ -88,9 +95,10 @@ BenchCheck scalarCheck(std::uint64_t count, const layout::Light& light, const Li
           same};
 }
 
-BenchCheck deviceCheck(const std::vector<float>& host, const std::vector<float>& device, const layout::Light& light,
-                       const LightingOptions& options) {
-  const std::vector<float> a = transmittances(host, light), b = transmittances(device, light);
+/// Two sets of exact optical depths may differ by what their cutoffs leave open.
+BenchCheck sameLight(const std::vector<float>& first, const std::vector<float>& second, const layout::Light& light,
+                     const LightingOptions& options) {
+  const std::vector<float> a = transmittances(first, light), b = transmittances(second, light);
   const double limit = std::max<double>(options.cutoff, kRounding);
   double worst = 0, mean = 0;
   std::size_t beyond = 0;
@@ -115,12 +123,30 @@ void addFloors(Bench& bench, const Comparison& times) {
     bench.addFloor({"lighting in compute / on TBB [time]", median(times.ratios()), kMostRatio});
 }
 
+void againstPlainPackets(Bench& bench, const std::string& name, const Cloud& cloud, const layout::Light& light,
+                         const LightingOptions& options) {
+  const Octree tree = buildOctree(cloud.position, cloud.radius, cloud.peak);
+  const Octree fine = buildOctree(cloud.position, cloud.radius, cloud.peak, kPlainPacketLeaf);
+  std::vector<float> beams, packets;
+  const Contender ours{"lighting on TBB", [&] { beams = opticalDepths(tree, light, options); }};
+  const Contender plain{"plain packets of 16 rays", [&] { packets = plainPacketDepths(fine, light, options); }};
+  const Comparison* times =
+      bench.compare(name, "rays", ours, plain, [&] { return sameLight(beams, packets, light, options); });
+  if (times)
+    bench.addFloor({fmt::format("{}: plain packets / lighting on TBB [time]", name), median(times->ratios()),
+                    kLeastAgainstPlain, true});
+}
+
 }  // namespace
 
 void benchLighting(Bench& bench) {
   const LightingOptions options;
   const layout::Light light = pointLight();
-  const Octree tree = timeBuild(bench, makeCloud(bench.count(), options.falloff));
+  const Cloud cloud = makeCloud(bench.count(), options.falloff);
+  const Octree tree = timeBuild(bench, cloud);
+  againstPlainPackets(bench, "exact, equal radii", cloud, light, options);
+  againstPlainPackets(bench, "exact, radii 10:1", makeCloud(bench.count(), options.falloff, kRadiusRange), light,
+                      options);
 
   std::vector<float> onHost, onDevice;
   const Contender host{"lighting on TBB", [&] { onHost = opticalDepths(tree, light, options); }};
@@ -132,7 +158,7 @@ void benchLighting(Bench& bench) {
     const Contender compute{"lighting in compute on the device",
                             [&] { onDevice = pass.opticalDepths(light, options); }};
     times = bench.compare("lighting", "rays", host, compute, [&] {
-      return both(scalarCheck(bench.count(), light, options), deviceCheck(onHost, onDevice, light, options));
+      return both(scalarCheck(bench.count(), light, options), sameLight(onHost, onDevice, light, options));
     });
   } else {
     times = bench.compare("lighting", "rays", host, std::nullopt,
