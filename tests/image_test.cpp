@@ -614,7 +614,7 @@ TEST(Compare, NotFinitePixelsAreCountedAndLeftOut) {
 
 TEST(Compare, LayersAreHeldAgainstEachOtherByName) {
   Image a = layered(4, 1), b = layered(4, 1);
-  EXPECT_TRUE(compareImages(a, b).onlyInOne.empty());
+  EXPECT_TRUE(failuresOf(compareImages(a, b)).empty());
   for (const LayerDifference& layer : compareImages(a, b).layers) {
     EXPECT_EQ(layer.channel.max, 0) << layer.name;
     EXPECT_EQ(layer.within, 1) << layer.name;
@@ -624,7 +624,8 @@ TEST(Compare, LayersAreHeldAgainstEachOtherByName) {
   b.layers[1].name = "shadow.rim";
   b.opticalDepth[2] += 0.25f;
   const ImageDifference d = compareImages(a, b);
-  EXPECT_EQ(d.onlyInOne, (std::vector<std::string>{"shadow.key", "shadow.rim"}));
+  EXPECT_EQ(d.onlyInFirst, std::vector<std::string>{"shadow.key"});
+  EXPECT_EQ(d.onlyInSecond, std::vector<std::string>{"shadow.rim"});
   const auto layer = [&](const std::string& name) {
     for (const LayerDifference& l : d.layers)
       if (l.name == name) return l;
@@ -637,6 +638,46 @@ TEST(Compare, LayersAreHeldAgainstEachOtherByName) {
   EXPECT_NEAR(layer("optical_depth").channel.max, 0.25, 1e-6);
   EXPECT_EQ(layer("optical_depth").channel.maxX, 2);
   EXPECT_SAYS(differenceJson(d), "\"optical_depth\"");
+}
+
+TEST(Compare, SmallNumbersOfALayerAreHeldToItsOwnScale) {
+  Image a = layered(4, 1), b = layered(4, 1);
+  for (Image* image : {&a, &b}) image->opticalDepth = {0, 0.02f, 0.05f, 0.01f};
+  const auto opticalDepth = [&] {
+    for (const LayerDifference& l : compareImages(a, b).layers)
+      if (l.name == "optical_depth") return l;
+    return LayerDifference{};
+  };
+  EXPECT_NEAR(opticalDepth().scale, 0.05, 1e-8);
+  EXPECT_NEAR(opticalDepth().level, 0.02, 1e-8);
+  b.opticalDepth[3] += 0.0003f;  // 2/255 of 0.05 is 0.00039
+  EXPECT_EQ(opticalDepth().within, 1);
+  b.opticalDepth[3] += 0.0002f;
+  EXPECT_EQ(opticalDepth().within, 0.75);
+  a.opticalDepth = {0, 0, 0, 0}, b.opticalDepth = {0, 0, 0, 7e-5f};  // 2/255 of the least scale, 0.01, is 7.8e-5
+  EXPECT_EQ(opticalDepth().within, 1);
+}
+
+TEST(Compare, FailuresNameTheLayerAndWhatIsWrongWithIt) {
+  const Image a = layered(4, 1);
+  const auto failures = [&](const Image& b) { return failuresOf(compareImages(a, b)); };
+  EXPECT_TRUE(failures(a).empty());
+  Image far = a, endless = a, less = a;
+  far.opticalDepth[0] += 1;
+  endless.opticalDepth[1] = kNan;
+  less.opticalDepth.clear();
+  ASSERT_EQ(failures(far).size(), 1u);
+  EXPECT_SAYS(failures(far)[0], "optical_depth: 75.0000 % of the pixels are within 2/255");
+  ASSERT_EQ(failures(endless).size(), 2u);
+  EXPECT_SAYS(failures(endless)[1], "optical_depth: 1 pixels are not finite");
+  ASSERT_EQ(failures(less).size(), 1u);
+  EXPECT_SAYS(failures(less)[0], "only the first picture has optical_depth");
+  ASSERT_EQ(failuresOf(compareImages(less, a)).size(), 1u);
+  EXPECT_SAYS(failuresOf(compareImages(less, a))[0], "only the second picture has optical_depth");
+  // The same infinity in both is no agreement.
+  Image infinite = a;
+  infinite.opticalDepth[2] = kInfinity;
+  EXPECT_EQ(failuresOf(compareImages(infinite, infinite)).size(), 2u);
 }
 
 TEST(Compare, DifferentSizesAreRefusedWithBoth) {

@@ -1,4 +1,5 @@
 // The program as a user meets it: usage, generate, info, compare, devices, and what it leaves behind.
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -548,6 +549,26 @@ TEST(MoteCompare, NotFinitePixelsNeverPass) {
   const ProcessResult result = test::mote({"compare", folder.file("a.exr"), folder.file("a.exr"), "--within", "0"});
   EXPECT_EQ(result.exitCode, 1);
   EXPECT_TRUE(contains(result.out, "1 pixels are not finite"));
+}
+
+TEST(MoteCompare, ALayerThatOnlyOnePictureHasFails) {
+  const TempFolder folder;
+  Image more = flatImage(8, 4, 0.5f);
+  more.opticalDepth.assign(32, 0.25f);
+  writeExr(folder.file("a.exr"), flatImage(8, 4, 0.5f), {});
+  writeExr(folder.file("b.exr"), more, {});
+  const std::pair<const char*, std::array<std::string, 2>> cases[] = {
+      {"second", {folder.file("a.exr"), folder.file("b.exr")}},
+      {"first", {folder.file("b.exr"), folder.file("a.exr")}}};
+  for (const auto& [which, files] : cases) {
+    const ProcessResult result = test::mote({"compare", files[0], files[1], "--report", folder.file("r.json")});
+    EXPECT_EQ(result.exitCode, 1) << result.out;
+    EXPECT_TRUE(contains(result.out, fmt::format("differs: only the {} picture has optical_depth", which)));
+    const json report = json::parse(readBytes(folder.file("r.json")));
+    EXPECT_EQ(report["passed"], false);
+    EXPECT_EQ(report["failures"].size(), 1u);
+    EXPECT_EQ(report[fmt::format("only_in_{}", which)], json{"optical_depth"});
+  }
 }
 
 TEST(MoteCompare, RefusesLimitsThatAreNone) {
