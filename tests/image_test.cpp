@@ -478,6 +478,55 @@ TEST(Png, ReadsDataAsItStandsAndAlphaApart) {
   EXPECT_EQ(read.pixels[1], vec4(1, 0, 1, 0)) << "not premultiplied: a pixel of no opacity keeps its colour";
 }
 
+/// A grey or RGB file of one row, its numbers as they are; `gamma` 0: no gAMA chunk.
+void writeRawPng(const std::string& path, int bits, int colorType, std::vector<std::uint8_t> row, double gamma) {
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);  // aborts on an error
+  png_infop info = png_create_info_struct(png);
+  std::FILE* file = std::fopen(path.c_str(), "wb");
+  ASSERT_NE(file, nullptr);
+  png_init_io(png, file);
+  const std::size_t pixelBytes = static_cast<std::size_t>(bits / 8) * (colorType == PNG_COLOR_TYPE_RGB ? 3 : 1);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(row.size() / pixelBytes), 1, bits, colorType, PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  if (gamma > 0) png_set_gAMA(png, info, gamma);
+  png_write_info(png, info);
+  png_write_row(png, row.data());
+  png_write_end(png, nullptr);
+  png_destroy_write_struct(&png, &info);
+  std::fclose(file);
+}
+
+TEST(Png, TakesDataAsItStandsWhateverItsBitsAndGamma) {
+  const TempFolder folder;
+  for (const double gamma : {0.0, 1.0, 0.45455}) {
+    // 0.2 and 0.8 of 255 and of 65535 (0x3333, 0xcccc), and a number that 8 bits do not hold.
+    writeRawPng(folder.file("8.png"), 8, PNG_COLOR_TYPE_GRAY, {51, 204}, gamma);
+    writeRawPng(folder.file("16.png"), 16, PNG_COLOR_TYPE_GRAY, {0x33, 0x33, 0xcc, 0xcc, 0x12, 0x34}, gamma);
+    const Image eight = readPng(folder.file("8.png"), PngValues::Data);
+    const Image sixteen = readPng(folder.file("16.png"), PngValues::Data);
+    ASSERT_EQ(sixteen.pixels.size(), 3u);
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_FLOAT_EQ(eight.pixels[0][c], 0.2f) << gamma;
+      EXPECT_FLOAT_EQ(eight.pixels[1][c], 0.8f) << gamma;
+      EXPECT_FLOAT_EQ(sixteen.pixels[0][c], 0.2f) << gamma;
+      EXPECT_FLOAT_EQ(sixteen.pixels[1][c], 0.8f) << gamma;
+      EXPECT_FLOAT_EQ(sixteen.pixels[2][c], 0x1234 / 65535.0f) << gamma;
+    }
+    EXPECT_EQ(sixteen.pixels[0].w, 1);
+  }
+}
+
+TEST(Png, TakesColoursOf16BitsAsSrgb) {
+  const TempFolder folder;
+  writeRawPng(folder.file("8.png"), 8, PNG_COLOR_TYPE_RGB, {188, 51, 255}, 0);
+  writeRawPng(folder.file("16.png"), 16, PNG_COLOR_TYPE_RGB, {188, 188, 51, 51, 255, 255}, 0);
+  const Image eight = readPng(folder.file("8.png"), PngValues::Color);
+  const Image sixteen = readPng(folder.file("16.png"), PngValues::Color);
+  ASSERT_EQ(sixteen.pixels.size(), 1u);
+  EXPECT_NEAR(sixteen.pixels[0].x, 0.5029, 1e-4);  // IEC 61966-2-1 of 188/255
+  for (int c = 0; c < 3; ++c) EXPECT_FLOAT_EQ(sixteen.pixels[0][c], eight.pixels[0][c]);
+}
+
 TEST(Png, RefusesWhatIsNoWholePicture) {
   const TempFolder folder;
   EXPECT_THROW(readPng(folder.file("gone.png"), PngValues::Data), InputError);
