@@ -336,6 +336,34 @@ TEST_F(Picture, LightLayersOfAPlainSceneSumToTheBeautyToo) {
   EXPECT_EQ(image.opticalDepth.size(), image.pixels.size());
 }
 
+TEST_F(Picture, LightingCastsOneRayAParticleAndLight) {
+  writeBall(folder.file("particles.prt"));
+  for (const double share : {1.0, 0.2})
+    for (const int lights : {0, 1, 2, 5}) {
+      std::string list;
+      for (int l = 0; l < lights; ++l)
+        list += fmt::format(R"({}{{"name": "l{}", "position": [{}, 2, 2]}})", l > 0 ? ", " : "", l, l);
+      writeBytes(folder.file("scene.json"), fmt::format(R"({{"particles": [{{"file": "particles.prt"}}], "lights": [{}],
+                                 "lighting": {{"subsample": {}}}}})",
+                                                        list, share));
+      Scene scene = readScene(folder.file("scene.json"));
+      FrameStats stats;
+      frame = prepareFrame(scene, 1, stats);
+      std::atomic<std::size_t> rays{0};
+      ShadowSources sources = hostShadows(frame);
+      const OpticalDepthSource host = sources.opticalDepths;
+      sources.opticalDepths = [&](const Receivers& receivers, const layout::Light& light,
+                                  std::span<const std::uint8_t> reached, const RaysDone& done) {
+        return host(receivers, light, reached, [&](std::size_t count) {
+          rays += count;
+          done(count);
+        });
+      };
+      lightParticles(frame, sources, {});
+      EXPECT_EQ(rays, static_cast<std::size_t>(lights) * 3000) << share;
+    }
+}
+
 TEST_F(Picture, SolidsMoveOnThePictureWithTheCamera) {
   const Image image =
       render(R"("camera": {"position": [0, 0, 4], "target": [0, 0, 0], "fov": 33.39849, "keys": [
