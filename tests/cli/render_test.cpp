@@ -177,9 +177,13 @@ TEST_F(MoteRender, PutsCameraFrameAndStatisticsIntoTheHeader) {
   for (const char* attribute : {"worldToCamera", "worldToNDC", "framesPerSecond", "pixelAspectRatio"})
     EXPECT_TRUE(contains(bytes, attribute));
   bool found = false;
-  for (const auto& [name, value] : exrStrings(folder_.file("out.exr")))
+  const auto strings = exrStrings(folder_.file("out.exr"));
+  for (const auto& [name, value] : strings)
     if (json::accept(value)) found = found || json::parse(value).dump().find("\"particles\":2000") != std::string::npos;
   EXPECT_TRUE(found) << "no attribute holds the statistics";
+  EXPECT_FALSE(strings.contains("mote:Z")) << "there is no Z";
+  ASSERT_EQ(render({"-o", folder_.file("z.exr"), "--set", R"(/output/aovs=["Z"])"}).exitCode, 0);
+  EXPECT_TRUE(contains(exrStrings(folder_.file("z.exr")).at("mote:Z"), "distance along the view axis"));
 }
 
 TEST_F(MoteRender, WritesThePixelAspectIntoTheHeader) {
