@@ -1,5 +1,6 @@
 #include "engine/frame.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/splats.h"
@@ -35,7 +36,8 @@ layout::Light toLight(const LightSource& source) {
 
 std::vector<FrameInput> hashInputs(const std::vector<std::string>& files) {
   std::vector<FrameInput> inputs;
-  for (const std::string& file : files) inputs.push_back({file, sha256OfFile(file)});
+  for (auto file = files.begin(); file != files.end(); ++file)
+    if (std::find(files.begin(), file, *file) == file) inputs.push_back({*file, sha256OfFile(*file)});
   return inputs;
 }
 
@@ -126,12 +128,20 @@ Viewer viewerOf(const layout::SplatCamera& camera) {
   return {.eye = camera.position, .parallel = camera.orthographic != 0, .toCamera = -camera.forward};
 }
 
-/// Meshes of the frame and the tree of those that cast shadows; adds their files to `files`.
-void prepareSolids(const Scene& scene, Frame& frame, std::vector<std::string>& files) {
+/// Everything that comes from files: particles, meshes and, for a picture, sprites.
+void load(const Scene& scene, FramePurpose purpose, Frame& frame, FrameStats& stats) {
+  std::vector<std::string> files;
+  frame.particles = loadParticles(scene.particles, frame.number, scene.medium.densityMode, &files);
   for (const Solid& solid : scene.solids) {
     frame.meshes.push_back(loadMesh(solid, frame.number));
     files.push_back(framePath(solid.file, frame.number));
   }
+  if (purpose == FramePurpose::Picture) frame.blank = readSprites(scene, files);
+  stats.inputs = hashInputs(files);
+}
+
+/// The tree of the meshes that cast shadows.
+void prepareSolids(const Scene& scene, Frame& frame) {
   frame.solidTree = buildSolidTree(shadowTriangles(scene.solids, frame.meshes));
   frame.solidLight = 1 - scene.lighting.solidShadowIntensity;
 }
@@ -159,25 +169,25 @@ layout::uint endpointCode(Endpoint endpoint) {
   return endpoint == Endpoint::Clamp ? layout::kEndpointClamp : layout::kEndpointSoft;
 }
 
-Frame prepareFrame(Scene& scene, int number, FrameStats& stats) {
+Frame prepareFrame(Scene& scene, int number, FrameStats& stats, FramePurpose purpose) {
   Frame frame;
   frame.number = stats.frame = number;
   Timer timer;
-  std::vector<std::string> files;
-  frame.particles = loadParticles(scene.particles, number, scene.medium.densityMode, &files);
+  load(scene, purpose, frame, stats);
   stats.seconds["load"] = timer.lap();
+
+  prepareSolids(scene, frame);
+  if (!scene.solids.empty()) stats.seconds["solids"] = timer.lap();
 
   fitDefaults(scene, frame.particles.supportBounds());
   for (const LightSource& light : scene.lights) {
     frame.lights.push_back(toLight(light));
     frame.lightNames.push_back(light.name);
   }
-  prepareSolids(scene, frame, files);
-  stats.inputs = hashInputs(files);
   prepareMedium(scene, frame);
   settleDensity(scene, frame);
   frame.density = DensityTree(DensityArrays(frame).input(), densityRules(scene));
-  frame.blank = blankSplats(scene, number, frame.rules.falloff);
+  setCameras(scene, number, frame.rules.falloff, frame.blank);
   frame.view = frame.blank.camera();
   frame.scattering = {phaseOf(scene.medium.phase), viewerOf(frame.view)};
 

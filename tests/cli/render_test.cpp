@@ -1,9 +1,14 @@
 // mote render from the outside: what it writes, what it refuses before any work, and what it leaves behind.
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "host/image/exr.h"
+#include "host/image/png.h"
 #include "host/particles/prt_writer.h"
 #include "tests/cli/mote_program.h"
 
@@ -168,6 +173,108 @@ TEST_F(MoteRender, StatsHoldTheDevicesOwnSecondsOfEachStage) {
     EXPECT_LE(frame["device_seconds"][stage], frame["seconds"][stage].get<double>() + 1e-3) << stage;
   }
   EXPECT_GT(frame["bytes"]["device"], 2000 * 20) << "the tree alone takes 20 bytes a particle";
+}
+
+TEST_F(MoteRender, SecondsOfSolidsAreTheirOwnAndTheLogNamesThem) {
+  makeBall(folder_);
+  writeBytes(folder_.file("wall.obj"), "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n");
+  const auto secondsOf = [&](const Arguments& settings, std::string& log) {
+    Arguments arguments{"-o", folder_.file("out.exr"), "--stats", folder_.file("stats.json")};
+    for (const std::string& setting : settings) arguments.insert(arguments.end(), {"--set", setting});
+    const ProcessResult result = render(arguments);
+    EXPECT_EQ(result.exitCode, 0) << result.err;
+    log = result.err;
+    return json::parse(readBytes(folder_.file("stats.json")))["frames"][0]["seconds"];
+  };
+  std::string log;
+  EXPECT_FALSE(secondsOf({}, log).contains("solids"));
+  EXPECT_FALSE(contains(log, "solids"));
+  for (const char* mode : {"shaded", "hidden"}) {
+    const json seconds = secondsOf({fmt::format(R"(/solids=[{{"file": "wall.obj", "mode": "{}"}}])", mode)}, log);
+    ASSERT_TRUE(seconds.contains("solids")) << mode;
+    EXPECT_GT(seconds["solids"], 0) << mode;
+    EXPECT_TRUE(contains(log, ", solids "));
+    double sum = 0;
+    for (const auto& [stage, value] : seconds.items()) sum += stage == "total" ? 0 : value.get<double>();
+    EXPECT_LE(sum, seconds["total"].get<double>() + 1e-5) << "no second counts twice: " << seconds;
+  }
+}
+
+// ---- sprites ----
+
+/// One particle of radius 1 at the origin before a camera 4 units away, lit by a sun from there: τ = ln 2 in its
+/// middle.
+constexpr const char* kSpriteScene = R"({
+  "particles": [{"file": "one.prt", "radius": 1}],
+  "medium": {"density_mode": "peak", "density_scale": 1, "albedo": [1, 1, 1]},
+  "lights": [{"name": "sun", "type": "directional", "direction": [0, 0, -1], "irradiance": 10}],
+  "camera": {"position": [0, 0, 4], "target": [0, 0, 0], "fov": 40, "near": 0.1, "far": 50},
+  "output": {"size": [65, 65], "precision": "float"}
+})";
+
+TEST_F(MoteRender, SpritesColourAndFadeAParticleAsTheirPixelsSay) {
+  const std::vector<vec3> position{{0, 0, 0}};
+  const std::vector<float> density{std::log(2.0f)};
+  const std::vector<PrtColumn> columns{PrtColumn::of("Position", std::span<const vec3>(position)),
+                                       PrtColumn::of("Density", std::span<const float>(density))};
+  writePrt(folder_.file("one.prt"), columns);
+  writeBytes(scene_, kSpriteScene);
+  // One pixel each, so that the middle of the splat is that very colour. An EXR's name may be in capitals.
+  writePngBytes(folder_.file("color.png"), {188, 51, 255}, 1, 1);
+  writePngBytes(folder_.file("opacity.png"), {51, 51, 51}, 1, 1);
+  Image color(1, 1), opacity(1, 1);
+  color.pixels[0] = vec4(2, 0.25f, 0, 1), opacity.pixels[0] = vec4(0.7f, 0.7f, 0.7f, 0.4f);
+  writeExr(folder_.file("COLOR.EXR"), color, {.precision = ExrPrecision::Float});
+  writeExr(folder_.file("opacity.exr"), opacity, {.precision = ExrPrecision::Float});
+  const double light = 0.5 * 10 / (4 * kPi);  // α · irradiance · isotropic phase, of a white particle
+  struct Case {
+    const char *color, *opacity;
+    dvec3 factor;
+    double share;
+  };
+  // 188, 51, 255 decoded by IEC 61966-2-1; 51 / 255 as it stands; alpha where there is any.
+  const Case cases[] = {{"", "", dvec3(1), 1},
+                        {"color.png", "", {0.502886, 0.033105, 1}, 1},
+                        {"COLOR.EXR", "", {2, 0.25, 0}, 1},
+                        {"", "opacity.png", dvec3(1), 0.2},
+                        {"", "opacity.exr", dvec3(1), 0.4},
+                        {"COLOR.EXR", "opacity.png", {2, 0.25, 0}, 0.2}};
+  for (const char* where : {"cpu", "gpu"})
+    for (const auto& [colorFile, opacityFile, factor, share] : cases) {
+      const ProcessResult result =
+          test::mote({"render", scene_, "--lighting", "cpu", "--raster", where, "-o", folder_.file("out.exr"), "--set",
+                      fmt::format("/view/sprite_color=\"{}\"", colorFile), "--set",
+                      fmt::format("/view/sprite_opacity=\"{}\"", opacityFile), "--stats", folder_.file("stats.json")},
+                     test::kOnLavapipe);
+      ASSERT_EQ(result.exitCode, 0) << result.err;
+      const vec4 middle = readExr(folder_.file("out.exr")).at(32, 32);
+      EXPECT_NEAR(middle.w, 0.5 * share, 1e-5) << where << " " << colorFile << " " << opacityFile;
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(middle[c], light * share * factor[c], 1e-5 * (1 + factor[c])) << where << " " << colorFile;
+      // What a picture is made from stands in its statistics.
+      const json inputs = json::parse(readBytes(folder_.file("stats.json")))["frames"][0]["inputs"];
+      std::string files;
+      for (const json& input : inputs) {
+        files += input["file"].get<std::string>() + " ";
+        EXPECT_EQ(input["sha256"].get<std::string>().size(), 64u);
+      }
+      EXPECT_EQ(inputs.size(), 1u + (*colorFile ? 1u : 0u) + (*opacityFile ? 1u : 0u));
+      for (const char* name : {colorFile, opacityFile}) EXPECT_TRUE(contains(files, name));
+    }
+}
+
+TEST_F(MoteRender, RefusesSpritesWithColoursThatAreNone) {
+  makeBall(folder_);
+  Image sprite(3, 2);
+  for (vec4& pixel : sprite.pixels) pixel = vec4(1);
+  for (const float bad : {-0.5f, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    sprite.at(2, 1).y = bad;
+    writeExr(folder_.file("puff.exr"), sprite, {.precision = ExrPrecision::Float});
+    expectRefusal(
+        folder_.file("puff.exr") + ": pixel 2, 1: expected finite colours ≥ 0, got 1, " + fmt::format("{}", bad),
+        {"--set", R"(/view/sprite_color="puff.exr")"});
+  }
+  expectRefusal("pixel 2, 1: expected finite numbers", {"--set", R"(/view/sprite_opacity="puff.exr")"});
 }
 
 TEST_F(MoteRender, PutsCameraFrameAndStatisticsIntoTheHeader) {
