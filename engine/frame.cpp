@@ -56,8 +56,10 @@ struct DensityArrays {
   }
   DensityInput input() const {
     const ParticleSet& particles = frame.particles;
-    if (channels[0].empty()) return {particles.position, particles.radius, frame.peak, {}, {}, particles.id};
-    return {particles.position, particles.radius, channels[0], channels[1], channels[2], particles.id};
+    std::span<const std::uint64_t> id;
+    if (frame.sampleById) id = particles.id;
+    if (channels[0].empty()) return {particles.position, particles.radius, frame.peak, {}, {}, id};
+    return {particles.position, particles.radius, channels[0], channels[1], channels[2], id};
   }
 };
 
@@ -91,8 +93,21 @@ void scale(std::vector<float>& peaks, double factor) {
   });
 }
 
-/// Density scale and sub-sampling that the scene leaves open, from its first frame.
-void settleDensity(Scene& scene, Frame& frame) {
+/// Whether the channel ID can choose the particles that cast shadows; says so where it cannot.
+bool idsServe(const Scene& scene, const ParticleSet& particles) {
+  const bool sampled = scene.lighting.autoSubsample || scene.lighting.subsample < 1;
+  if (!sampled || particles.id.empty()) return true;
+  const double share = meanIdShare(particles.id);
+  if (share <= kMostIdShare) return true;
+  logWarning(
+      fmt::format("ID is no name of a particle: {:.0f} of them share one in the mean; lighting.subsample goes by "
+                  "the index instead, which is steady only where the order of the particles is",
+                  share));
+  return false;
+}
+
+/// Density scale and sub-sampling that the scene leaves open, from its first frame; `stats` gets what is measured.
+void settleDensity(Scene& scene, Frame& frame, FrameStats& stats) {
   if (scene.medium.opticalDepth) {
     const double density = calibratedScale(frame, *scene.medium.opticalDepth, scene.path);
     logVerbose(fmt::format("optical_depth {} is density_scale {}", *scene.medium.opticalDepth, density));
@@ -108,7 +123,7 @@ void settleDensity(Scene& scene, Frame& frame) {
                          choice.error, scene.lighting.error));
   scene.lighting.subsample = choice.fraction;
   scene.lighting.autoSubsample = false;
-  scene.lighting.subsampleError = choice.error;
+  stats.subsampleError = choice.error;
 }
 
 void prepareMedium(const Scene& scene, Frame& frame) {
@@ -185,7 +200,8 @@ Frame prepareFrame(Scene& scene, int number, FrameStats& stats, FramePurpose pur
     frame.lightNames.push_back(light.name);
   }
   prepareMedium(scene, frame);
-  settleDensity(scene, frame);
+  frame.sampleById = idsServe(scene, frame.particles);
+  settleDensity(scene, frame, stats);
   frame.density = DensityTree(DensityArrays(frame).input(), densityRules(scene));
   setCameras(scene, number, frame.rules.falloff, frame.blank);
   frame.view = frame.blank.camera();
@@ -195,7 +211,10 @@ Frame prepareFrame(Scene& scene, int number, FrameStats& stats, FramePurpose pur
   stats.particles = frame.particles.size();
   stats.inOctree = frame.density.tree().particleCount();
   stats.subsample = scene.lighting.subsample;
-  stats.subsampleError = scene.lighting.subsampleError;
+  if (stats.subsample >= 1) stats.subsampleError = 0;
+  if (stats.inOctree == 0 && stats.particles > 0)
+    logWarning(fmt::format("lighting.subsample {:g} leaves none of the {} particles in the octree: none casts a shadow",
+                           stats.subsample, stats.particles));
   stats.lights = frame.lights.size();
   stats.radius = radiusRange(frame.particles);
   stats.seconds["octree"] = timer.lap();

@@ -30,6 +30,7 @@ struct Frame {
   float solidLight = 0;      ///< share of the light that passes a solid: 1 − solid_shadow_intensity
   layout::SplatCamera view;  ///< the camera as the splats take it
   SplatSet blank;            ///< … at every moment that counts, and sprites; no particles
+  bool sampleById = true;    ///< false: too many particles share their ID, the index says which of them cast shadows
 };
 
 /// What a frame is made for: the light alone needs no sprites.

@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,8 +24,8 @@ struct FrameStats {
   std::map<std::string, double> deviceSeconds;  ///< the GPU's own clock (timestamps): lighting, sort, splat
   std::uint64_t deviceBytes = 0;                ///< most device memory held at once by one stage
   double densityScale = 1;
-  double subsample = 1;       ///< share of the particles in the octree …
-  double subsampleError = 0;  ///< … and its mean |ΔT| where "auto" measured it
+  double subsample = 1;                  ///< share of the particles in the octree …
+  std::optional<double> subsampleError;  ///< … and its mean |ΔT|: 0 for all, else empty unless measured on this frame
   RadiusRange radius;
   std::vector<FrameInput> inputs;
   std::vector<std::string> warnings;

@@ -82,6 +82,15 @@ TEST(DensityTree, WithoutIdsTheIndexDecides) {
   EXPECT_NE(indices(), byId);
 }
 
+TEST(DensityTree, MeanIdShareIsOneWhereEveryIdIsAnothersAndTheCountWhereAllAreOne) {
+  using Ids = std::vector<std::uint64_t>;
+  EXPECT_EQ(meanIdShare(Ids{}), 0);
+  EXPECT_EQ(meanIdShare(Ids{7, 3, 9, 0}), 1);
+  EXPECT_EQ(meanIdShare(Ids{7, 7, 7, 7}), 4);
+  EXPECT_EQ(meanIdShare(Ids{1, 2, 3, 1, 2, 3}), 2);  // two sources that count from 1
+  EXPECT_EQ(meanIdShare(Ids{5, 0, 5, 5}), 2.5);      // (3 · 3 + 1 · 1) / 4
+}
+
 TEST(DensityTree, EveryParticleIsLitAndLeavesItselfOut) {
   const Cloud cloud(5000);
   const DensityTree density(cloud.input(), {.fraction = 0.3f});

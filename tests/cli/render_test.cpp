@@ -7,6 +7,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "host/core/random.h"
 #include "host/image/exr.h"
 #include "host/image/png.h"
 #include "host/particles/prt_writer.h"
@@ -173,6 +174,85 @@ TEST_F(MoteRender, StatsHoldTheDevicesOwnSecondsOfEachStage) {
     EXPECT_LE(frame["device_seconds"][stage], frame["seconds"][stage].get<double>() + 1e-3) << stage;
   }
   EXPECT_GT(frame["bytes"]["device"], 2000 * 20) << "the tree alone takes 20 bytes a particle";
+}
+
+TEST_F(MoteRender, StatsTellTheErrorOfASubsampleOnlyWhereItWasMeasured) {
+  writeBytes(scene_, R"({"particles": [{"generate": "ball", "count": 3000}], "output": {"size": [32, 24]}})");
+  const auto subsamples = [&](const Arguments& settings, const std::string& frames = "1-1") {
+    Arguments arguments{"-o", folder_.file("out.#.exr"), "--frames", frames, "--stats", folder_.file("stats.json")};
+    for (const std::string& setting : settings) arguments.insert(arguments.end(), {"--set", setting});
+    const ProcessResult result = render(arguments);
+    EXPECT_EQ(result.exitCode, 0) << result.err;
+    json found = json::array();
+    const json stats = json::parse(readBytes(folder_.file("stats.json")));
+    for (const json& frame : stats["frames"]) found.push_back(frame["subsample"]);
+    // The picture's header says the same.
+    const json header = json::parse(exrStrings(folder_.file("out.1.exr")).at("mote:stats"));
+    EXPECT_EQ(header["subsample"], found[0]);
+    return found;
+  };
+  EXPECT_EQ(subsamples({}).dump(), R"([{"error":0.0,"fraction":1.0}])");
+  const json fixed = subsamples({"/lighting/subsample=0.25", "/lighting/error=0.05"});
+  EXPECT_EQ(fixed[0]["fraction"], 0.25);
+  EXPECT_TRUE(fixed[0]["error"].is_null()) << "nobody measured it";
+  const json measured = subsamples({R"(/lighting/subsample="auto")", "/lighting/error=0.05"}, "1-2");
+  ASSERT_EQ(measured.size(), 2u);
+  EXPECT_GT(measured[0]["fraction"], 0);
+  EXPECT_LT(measured[0]["fraction"], 1);
+  EXPECT_GT(measured[0]["error"], 0);
+  EXPECT_LE(measured[0]["error"], 0.05);
+  EXPECT_EQ(measured[1]["fraction"], measured[0]["fraction"]);
+  EXPECT_TRUE(measured[1]["error"].is_null()) << "the second frame keeps the share and measures nothing";
+}
+
+/// ball.prt: 2,000 particles in a ball, each with the ID that `id` gives it.
+template <class Id>
+void writeBallWithIds(const TempFolder& folder, const Id& id) {
+  std::vector<vec3> position;
+  std::vector<std::uint64_t> ids;
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    Random random(3, i);
+    position.push_back(vec3(random.direction() * std::cbrt(random.uniform())));
+    ids.push_back(id(i));
+  }
+  const std::vector<PrtColumn> columns{PrtColumn::of("Position", std::span<const vec3>(position)),
+                                       PrtColumn::of("ID", std::span<const std::uint64_t>(ids))};
+  writePrt(folder.file("ball.prt"), columns);
+}
+
+TEST_F(MoteRender, GoesByTheIndexWhereTooManyParticlesShareAnId) {
+  const auto frameOf = [&](const Arguments& settings) {
+    Arguments arguments{"-o", folder_.file("out.exr"), "--stats", folder_.file("stats.json")};
+    for (const std::string& setting : settings) arguments.insert(arguments.end(), {"--set", setting});
+    const ProcessResult result = render(arguments);
+    EXPECT_EQ(result.exitCode, 0) << result.err;
+    return json::parse(readBytes(folder_.file("stats.json")))["frames"][0];
+  };
+  const Arguments tenth{"/lighting/subsample=0.1"};
+  writeBallWithIds(folder_, [](std::uint64_t i) { return i; });
+  const json byIndex = frameOf(tenth);
+  EXPECT_TRUE(byIndex["warnings"].empty()) << byIndex["warnings"];
+  writeBallWithIds(folder_, [](std::uint64_t i) { return i % 1000; });  // as two sources would have it
+  EXPECT_TRUE(frameOf(tenth)["warnings"].empty());
+  for (const std::uint64_t ids : {1, 20}) {
+    writeBallWithIds(folder_, [&](std::uint64_t i) { return 7 + i % ids; });
+    const json shared = frameOf(tenth);
+    EXPECT_EQ(shared["in_octree"], byIndex["in_octree"]);
+    ASSERT_EQ(shared["warnings"].size(), 1u) << shared["warnings"];
+    EXPECT_TRUE(contains(shared["warnings"][0], fmt::format("ID is no name of a particle: {}", 2000 / ids)));
+    EXPECT_TRUE(frameOf({})["warnings"].empty()) << "all particles are in the octree: nothing is chosen";
+  }
+}
+
+TEST_F(MoteRender, WarnsWhereASubsampleLeavesNothingInTheOctree) {
+  makeBall(folder_);
+  const ProcessResult result = render(
+      {"-o", folder_.file("out.exr"), "--set", "/lighting/subsample=1e-6", "--stats", folder_.file("stats.json")});
+  ASSERT_EQ(result.exitCode, 0) << result.err;
+  const json frame = json::parse(readBytes(folder_.file("stats.json")))["frames"][0];
+  EXPECT_EQ(frame["in_octree"], 0);
+  ASSERT_EQ(frame["warnings"].size(), 1u);
+  EXPECT_TRUE(contains(frame["warnings"][0], "leaves none of the 2000 particles in the octree"));
 }
 
 TEST_F(MoteRender, SecondsOfSolidsAreTheirOwnAndTheLogNamesThem) {
