@@ -91,11 +91,9 @@ void writeBall(const std::string& path, bool everyChannel) {
   writePrt(path, columns);
 }
 
-/// How far apart two pictures are: the greatest RMSE of R G B A and of the layers, these by their scale; 1 where one
-/// has channels that the other has not.
+/// How far apart two pictures are: the greatest RMSE of R G B A and of the layers that both have, these by their scale.
 double change(const Image& a, const Image& b) {
   const ImageDifference d = compareImages(a, b);
-  if (!d.onlyInFirst.empty() || !d.onlyInSecond.empty()) return 1;
   double greatest = d.overall.rmse;
   for (const LayerDifference& layer : d.layers)
     greatest =
@@ -202,8 +200,8 @@ constexpr const char* kAlbedo = R"(/solids/1/albedo=[0.9, 0.1, 0.1])";
 
 const Feature kFeatures[] = {
     {"SpotAndSun", {}},
-    {"PointLight", {R"(/lights/0={"name": "key", "position": [2, 2, 2], "intensity": 60, "decay": 1})"}},
-    {"PointLightInside", {R"(/lights/0={"name": "key", "position": [0.1, 0.2, 0], "intensity": 1})"}},
+    {"PointLight", {R"(/lights/0={"name": "rim", "position": [2, 2, 2], "intensity": 60})", "/lights/0/decay=1"}},
+    {"PointLightInside", {R"(/lights/0={"name": "rim", "position": [0.1, 0.2, 0], "intensity": 1})"}},
     {"ShadowDensity", {"/lights/0/shadow_density=0.3", "/lights/1/shadow_density=2.5"}},
     {"LightWithoutShadows", {"/lights/0/casts_shadows=false"}},
     {"SunWithoutShadowsAmongSolids", {"/lights/1/casts_shadows=false"}, {kSolids}},
