@@ -30,13 +30,18 @@ struct Frame {
   float solidLight = 0;      ///< share of the light that passes a solid: 1 − solid_shadow_intensity
   layout::SplatCamera view;  ///< the camera as the splats take it
   SplatSet blank;            ///< … at every moment that counts, and sprites; no particles
+  bool sampleById = true;    ///< false: too many particles share their ID, the index says which of them cast shadows
 };
 
-/// Loads and builds; fills `stats` (counts, radius, density scale, inputs, seconds of load and octree).
+/// What a frame is made for: the light alone needs no sprites.
+enum class FramePurpose { Picture, Light };
+
+/// Loads and builds; fills `stats` (counts, radius, density scale, inputs; seconds of load, of octree with calibration
+/// and "auto" sub-sampling, and of solids for their tree).
 /// What the scene leaves open (a fitted camera, the default light, a density calibrated by optical depth) is settled by
 /// the first frame that is prepared and written into `scene`, so that a sequence neither jitters nor flickers.
 /// Throws InputError as readers and loaders do.
-Frame prepareFrame(Scene& scene, int number, FrameStats& stats);
+Frame prepareFrame(Scene& scene, int number, FrameStats& stats, FramePurpose purpose = FramePurpose::Picture);
 
 /// Shader codes of the scene's choices.
 layout::uint falloffCode(Falloff falloff);

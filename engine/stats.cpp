@@ -13,15 +13,17 @@ using Json = nlohmann::ordered_json;
 Json reproducible(const FrameStats& frame) {
   Json inputs = Json::array();
   for (const FrameInput& input : frame.inputs) inputs.push_back({{"file", input.file}, {"sha256", input.sha256}});
-  return {{"frame", frame.frame},
-          {"particles", frame.particles},
-          {"in_octree", frame.inOctree},
-          {"lights", frame.lights},
-          {"density_scale", frame.densityScale},
-          {"subsample", {{"fraction", frame.subsample}, {"error", frame.subsampleError}}},
-          {"radius", {{"min", frame.radius.min}, {"mean", frame.radius.mean}, {"max", frame.radius.max}}},
-          {"inputs", std::move(inputs)},
-          {"warnings", frame.warnings}};
+  return {
+      {"frame", frame.frame},
+      {"particles", frame.particles},
+      {"in_octree", frame.inOctree},
+      {"lights", frame.lights},
+      {"density_scale", frame.densityScale},
+      {"subsample",
+       {{"fraction", frame.subsample}, {"error", frame.subsampleError ? Json(*frame.subsampleError) : Json(nullptr)}}},
+      {"radius", {{"min", frame.radius.min}, {"mean", frame.radius.mean}, {"max", frame.radius.max}}},
+      {"inputs", std::move(inputs)},
+      {"warnings", frame.warnings}};
 }
 
 Json rounded(const std::map<std::string, double>& seconds) {
