@@ -124,6 +124,14 @@ void settleDensity(Scene& scene, Frame& frame, FrameStats& stats) {
   scene.lighting.subsample = choice.fraction;
   scene.lighting.autoSubsample = false;
   stats.subsampleError = choice.error;
+  if (choice.fraction < 1) scene.lighting.error = 0;  // the sample has spent it: its light is exact
+}
+
+/// True where this frame is one of many: of this run, or of a sequence that other runs do the rest of.
+bool isAnimated(const Scene& scene) {
+  if (scene.frames.first != scene.frames.last) return true;
+  return std::any_of(scene.particles.begin(), scene.particles.end(),
+                     [](const ParticleSource& source) { return source.file.find('#') != std::string::npos; });
 }
 
 void prepareMedium(const Scene& scene, Frame& frame) {
@@ -202,6 +210,7 @@ Frame prepareFrame(Scene& scene, int number, FrameStats& stats, FramePurpose pur
   prepareMedium(scene, frame);
   frame.sampleById = idsServe(scene, frame.particles);
   settleDensity(scene, frame, stats);
+  frame.error = {scene.lighting.error, isAnimated(scene)};
   frame.density = DensityTree(DensityArrays(frame).input(), densityRules(scene));
   setCameras(scene, number, frame.rules.falloff, frame.blank);
   frame.view = frame.blank.camera();
