@@ -223,8 +223,7 @@ Frame prepareFrame(Scene& scene, int number, FrameStats& stats, FramePurpose pur
   frame.sampleById = idsServe(scene, frame.particles);
   settleDensity(scene, frame, stats);
   frame.error = {scene.lighting.error, isAnimated(scene)};
-  if (frame.density.source().empty())
-    frame.density = DensityTree(DensityArrays(frame).input(), densityRules(scene));
+  if (frame.density.source().empty()) frame.density = DensityTree(DensityArrays(frame).input(), densityRules(scene));
   setCameras(scene, number, frame.rules.falloff, frame.blank);
   frame.view = frame.blank.camera();
   frame.scattering = {phaseOf(scene.medium.phase), viewerOf(frame.view)};
