@@ -131,7 +131,7 @@ Image makePicture(const Frame& frame, const Scene& scene, const SplatSet& set, L
   const SplatLayers plain{.colorAlpha = !frame.extinction.grey() && !surfaces.empty()};
   const bool emits = !set.emission.empty();
   if (emits) {  // first, since the others take the emission away
-    rasterizer.relight(relit(set, frame, scene, std::vector<vec3>(set.particles.size(), vec3(0))), true);
+    rasterizer.relight(relit(set, frame, scene, std::vector<vec3>(frame.density.source().size(), vec3(0))), true);
     addColorLayers(composer.compose(SurfaceRadiance(total.size(), vec3(0)), plain), "emission", picture);
   }
   for (std::size_t l = 0; l < frame.lights.size(); ++l) {

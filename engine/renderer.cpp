@@ -118,6 +118,7 @@ Image Renderer::draw(const Frame& frame, const Scene& scene, LitParticles lit, F
 
   SplatSet set = splatSet(frame, scene, lit.radiance);
   lit.radiance = {};
+  stats.drawn = set.particles.size();
   const float keyScale = depthKeyScale(frame.particles.bounds(), frame.view.position);
   const std::unique_ptr<Rasterizer> rasterizer = backends_.gpuRaster
                                                      ? deviceRasterizer(gpu_->device(), set, keyScale, stats)
