@@ -94,8 +94,8 @@ std::vector<std::uint32_t> seenReceivers(const Frame& frame, const View& view, c
   parallelBlocks(receivers.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t>& seen = parts[begin / kBlock];
     for (std::size_t k = begin; k < end; ++k) {
-      const layout::SplatParticle particle{.position = receivers.position(k),
-                                           .radius = particles.radius[source[k]] * view.radiusScale};
+      layout::SplatParticle particle{};
+      particle.position = receivers.position(k), particle.radius = particles.radius[source[k]] * view.radiusScale;
       const vec3 velocity = particles.velocity.empty() ? vec3(0) : particles.velocity[source[k]];
       if (maybeSeen(particle, velocity, scene)) seen.push_back(static_cast<std::uint32_t>(k));
     }
