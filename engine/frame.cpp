@@ -75,11 +75,9 @@ DensityRules densityRules(const Scene& scene) {
 
 /// The scale on Density that gives lines through the particles the mean optical depth that the scene asks for: of all
 /// particles at their own size, as they are drawn, whatever share of them casts shadows.
-double calibratedScale(const Frame& frame, double wanted, const std::string& place) {
-  const DensityArrays arrays(frame);
-  const DensityTree all(arrays.input(), {});
+double calibratedScale(const Octree& all, const Frame& frame, double wanted, const std::string& place) {
   const vec3& uniform = frame.rules.extinction;
-  const double mean = meanLineOpticalDepth(all.tree(), frame.rules.falloff) * (uniform.x + uniform.y + uniform.z) / 3;
+  const double mean = meanLineOpticalDepth(all, frame.rules.falloff) * (uniform.x + uniform.y + uniform.z) / 3;
   if (!(mean > 0))
     throw InputError(place, "/medium/optical_depth", "particles with some density to calibrate",
                      "a mean optical depth of 0", "is the channel Density, or medium.extinction, zero everywhere?");
@@ -106,13 +104,27 @@ bool idsServe(const Scene& scene, const ParticleSet& particles) {
   return false;
 }
 
+bool castsAsDrawn(const Scene& scene, const Frame& frame) {
+  const LightingSettings& lighting = scene.lighting;
+  return !lighting.autoSubsample && lighting.subsample >= 1 && lighting.radiusScale == 1 &&
+         frame.extinction.factor.empty();
+}
+
 /// Density scale and sub-sampling that the scene leaves open, from its first frame; `stats` gets what is measured.
 void settleDensity(Scene& scene, Frame& frame, FrameStats& stats) {
   if (scene.medium.opticalDepth) {
-    const double density = calibratedScale(frame, *scene.medium.opticalDepth, scene.path);
+    const DensityArrays arrays(frame);
+    // Where all particles cast shadows at their own size this tree is also the frame's; only its densities change.
+    const bool keep = castsAsDrawn(scene, frame);
+    DensityTree all(arrays.input(), keep ? densityRules(scene) : DensityRules{});
+    const double density = calibratedScale(all.tree(), frame, *scene.medium.opticalDepth, scene.path);
     logVerbose(fmt::format("optical_depth {} is density_scale {}", *scene.medium.opticalDepth, density));
     scene.medium.densityScale = static_cast<float>(density);
     scene.medium.opticalDepth.reset();
+    if (keep) {
+      all.scaleDensity(scene.medium.densityScale);
+      frame.density = std::move(all);
+    }
   }
   scale(frame.peak, scene.medium.densityScale);
   if (!scene.lighting.autoSubsample) return;
@@ -124,6 +136,14 @@ void settleDensity(Scene& scene, Frame& frame, FrameStats& stats) {
   scene.lighting.subsample = choice.fraction;
   scene.lighting.autoSubsample = false;
   stats.subsampleError = choice.error;
+  if (choice.fraction < 1) scene.lighting.error = 0;  // the sample has spent it: its light is exact
+}
+
+/// True where this frame is one of many: of this run, or of a sequence that other runs do the rest of.
+bool isAnimated(const Scene& scene) {
+  if (scene.frames.first != scene.frames.last) return true;
+  return std::any_of(scene.particles.begin(), scene.particles.end(),
+                     [](const ParticleSource& source) { return source.file.find('#') != std::string::npos; });
 }
 
 void prepareMedium(const Scene& scene, Frame& frame) {
@@ -202,7 +222,8 @@ Frame prepareFrame(Scene& scene, int number, FrameStats& stats, FramePurpose pur
   prepareMedium(scene, frame);
   frame.sampleById = idsServe(scene, frame.particles);
   settleDensity(scene, frame, stats);
-  frame.density = DensityTree(DensityArrays(frame).input(), densityRules(scene));
+  frame.error = {scene.lighting.error, isAnimated(scene)};
+  if (frame.density.source().empty()) frame.density = DensityTree(DensityArrays(frame).input(), densityRules(scene));
   setCameras(scene, number, frame.rules.falloff, frame.blank);
   frame.view = frame.blank.camera();
   frame.scattering = {phaseOf(scene.medium.phase), viewerOf(frame.view)};

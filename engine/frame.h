@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/stats.h"
+#include "host/lighting/approximate.h"
 #include "host/lighting/density_tree.h"
 #include "host/lighting/lighting.h"
 #include "host/lighting/medium.h"
@@ -24,6 +25,7 @@ struct Frame {
   std::vector<layout::Light> lights;
   std::vector<std::string> lightNames;
   LightingOptions rules;  ///< falloff, endpoint, cutoff, extinction where it is uniform
+  ErrorWanted error;      ///< what lights may be off
   Scattering scattering;
   std::vector<Mesh> meshes;  ///< of scene.solids, in their order
   SolidTree solidTree;       ///< of the triangles that cast shadows

@@ -96,7 +96,7 @@ LitParticles Renderer::light(const Frame& frame, LightWanted wanted, FrameStats&
     lit = lightParticles(frame, device.sources(frame), wanted);
     device.addTo(stats);
   } else {
-    lit = lightParticles(frame, hostShadows(frame), wanted);
+    lit = lightParticles(frame, hostShadows(frame, frame.error.mean > 0 ? &stats.methods : nullptr), wanted);
   }
   stats.seconds["lighting"] += timer.lap();
   return lit;

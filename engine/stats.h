@@ -6,12 +6,19 @@
 #include <string>
 #include <vector>
 
+#include "host/lighting/approximate.h"
 #include "host/particles/particle_set.h"
 
 namespace mote {
 
 struct FrameInput {
   std::string file, sha256;
+};
+
+/// How one light's shadows in the medium were computed.
+struct LightMethod {
+  std::string light;
+  Approximation how;
 };
 
 struct FrameStats {
@@ -27,6 +34,7 @@ struct FrameStats {
   double subsample = 1;                  ///< share of the particles in the octree …
   std::optional<double> subsampleError;  ///< … and its mean |ΔT|: 0 for all, else empty unless measured on this frame
   RadiusRange radius;
+  std::vector<LightMethod> methods;  ///< of the particles' light; empty where nothing but exact sums was allowed
   std::vector<FrameInput> inputs;
   std::vector<std::string> warnings;
 };
