@@ -6,6 +6,7 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -27,6 +28,7 @@ struct Contender {
   std::string name;
   std::function<void()> work;          ///< timed
   std::function<void()> prepare = {};  ///< before each run, not timed
+  std::uint64_t count = 0;             ///< of what it works on; 0: the benchmark's own
 };
 
 /// Whether the contenders' results are right, and how that was seen.
@@ -38,7 +40,7 @@ struct BenchCheck {
 /// The seconds of one benchmark; without B where there is nothing to run it on.
 struct Comparison {
   std::string name, unit;  ///< unit: of what `count` counts
-  std::uint64_t count = 0;
+  std::uint64_t countA = 0, countB = 0;
   std::string a, b;
   BenchCheck check;
   std::vector<double> secondsA, secondsB;  ///< wall clock
@@ -71,9 +73,10 @@ class Bench {
   const Device* device() const { return gpu_ ? &gpu_->device() : nullptr; }
 
   /// Runs both once, checks, and if that passes times them; prints. The result is null where the check failed; it is
-  /// valid until the next call.
+  /// valid until the next call. `mostRuns`: no more timed runs than that, for what takes minutes.
   const Comparison* compare(const std::string& name, const std::string& unit, const Contender& a,
-                            const std::optional<Contender>& b, const std::function<BenchCheck()>& check);
+                            const std::optional<Contender>& b, const std::function<BenchCheck()>& check,
+                            int mostRuns = std::numeric_limits<int>::max());
 
   void addFloor(Floor floor) { floors_.push_back(std::move(floor)); }
 
@@ -91,8 +94,10 @@ class Bench {
   std::vector<Floor> floors_;
 };
 
-// Each runs one of `mote bench …`: lighting and octree, the bitonic sort, the splat pass.
+// Each runs one of `mote bench …`: lighting and octree, time per particle against particles, the bitonic sort, the
+// splat pass.
 void benchLighting(Bench& bench);
+void benchScaling(Bench& bench);
 void benchSort(Bench& bench);
 void benchSplat(Bench& bench);
 

@@ -147,7 +147,9 @@ void placeSlots(FourierMap& map, const Octree& tree, std::size_t begin, std::siz
   for (std::size_t i = begin; i < end; ++i) {
     map.depth[i] = std::min(std::max((map.depth[i] - map.nearest) * map.inverseRange, 0.0f), 1.0f);
     const float x = map.x[i], y = map.y[i], z = map.frame.perspective ? map.z[i] : 1;
-    const float r = std::max(tree.radius[i], kLeastRadius * map.texel * z);
+    // Interpolation adds a texel's variance, 1/6 along each axis, to the kernel's, r²/8.
+    const float texel = map.texel * z, widened = tree.radius[i] * tree.radius[i] - 8.0f / 6 * texel * texel;
+    const float r = std::max(std::sqrt(std::max(widened, 0.0f)), kLeastRadius * texel);
     map.radius[i] = r;
     map.scale[i] = tree.peak[i] * (tree.radius[i] / r) * (tree.radius[i] / r);
     Footprint& print = map.footprint[i];

@@ -106,7 +106,7 @@ std::vector<float> SphereHits::opticalDepths(const layout::Light& light, const L
     collector.tree = &tree_, collector.limit = limit;
     if (rays == Rays::Packets) collector.context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     for (std::size_t first = begin; first < end; first += width) {
-      alignas(64) int valid[kMostRays];
+      alignas(64) int valid[kMostRays] = {};
       RTCRay16 packet{};
       RTCRay single{};
       for (std::size_t k = 0; k < width; ++k) {
