@@ -21,6 +21,9 @@ namespace {
 constexpr int kFailed = 1, kBadInput = 2, kMachine = 3;
 
 constexpr std::uint64_t kLeastCount = 4000;  // fewer make no p99
+/// Sides of maps: whole tiles, in steps of some 10 %.
+constexpr int kMapSizes[] = {48,  64,  80,  96,  112, 128, 144, 160, 176, 192, 208, 224,  240,  256,  288,
+                             320, 352, 384, 416, 448, 512, 576, 640, 704, 768, 896, 1024, 1280, 1536, 2048};
 constexpr std::size_t kMostMapBytes = std::size_t{1} << 30;
 
 struct Options {
@@ -57,8 +60,7 @@ void holdFourierMaps(Contest& contest, const Task& task, const Options& options)
   for (const int harmonics : {15, 7, 31, 3, 63})
     for (const bool thick : {false, true}) {
       series.emplace_back();
-      for (const int size :
-           {48, 64, 80, 96, 112, 128, 160, 192, 224, 256, 320, 384, 448, 512, 640, 768, 1024, 1536, 2048})
+      for (const int size : kMapSizes)
         if (const FourierMapOptions map{size, harmonics, thick}; fourierMapBytes(map) <= kMostMapBytes)
           series.back().push_back(fourierPeer(task, map));
     }
