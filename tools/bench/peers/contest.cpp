@@ -75,7 +75,8 @@ void print(const Match& match) {
   if (match.passed()) {
     const std::vector<double> ratios = match.ratios();
     const auto [least, most] = std::minmax_element(ratios.begin(), ratios.end());
-    fmt::print("   peer / Mote {:.3g} ({:.3g} .. {:.3g})", median(ratios), *least, *most);
+    fmt::print("   peer / Mote {:.3g} ({:.3g} .. {:.3g}), of CPU time {:.3g}", median(ratios), *least, *most,
+               median(match.peer.core) / median(match.mote.core));
   } else {
     fmt::print("   DIFFERS: beyond a mean |ΔT| of {}", match.limit);
   }

@@ -21,10 +21,10 @@
 #define MOTE_PEERS_FOURIER_MAP_TYPES
 namespace mote {
 
-constexpr int kTile = 16;          // texels a side: with 7 harmonics 16 KiB, half of a first-level cache
-constexpr int kNarrow = 12;        // kernels up to as many texels across are scaled to keep their integral
-constexpr int kRow = kTile + 16;   // a row of kernel values: the last vector may run over the end
-constexpr float kLeastRadius = 1;  // [texels]: what is narrower falls between the texels
+constexpr int kTile = 16;             // texels a side: with 7 harmonics 16 KiB, half of a first-level cache
+constexpr int kNarrow = 12;           // kernels up to as many texels across are scaled to keep their integral
+constexpr int kRow = kTile + 16;      // a row of kernel values: the last vector may run over the end
+constexpr float kLeastRadius = 1.0f;  // [texels]: what is narrower falls between the texels
 constexpr int kMostNumbers = 2 * (63 + 1);
 
 /// Texels whose centres may lie in a kernel; right and bottom inclusive.
@@ -147,8 +147,9 @@ void placeSlots(FourierMap& map, const Octree& tree, std::size_t begin, std::siz
   for (std::size_t i = begin; i < end; ++i) {
     map.depth[i] = std::min(std::max((map.depth[i] - map.nearest) * map.inverseRange, 0.0f), 1.0f);
     const float x = map.x[i], y = map.y[i], z = map.frame.perspective ? map.z[i] : 1;
-    // Interpolation adds a texel's variance, 1/6 along each axis, to the kernel's, r²/8.
-    const float texel = map.texel * z, widened = tree.radius[i] * tree.radius[i] - 8.0f / 6 * texel * texel;
+    // Interpolation adds a sixth of a texel² along each axis to the kernel's variance, r²/8. Taking half of it off
+    // again gave the least errors (1 M particles, maps of 64² to 384²); all of it misses what falls between the texels.
+    const float texel = map.texel * z, widened = tree.radius[i] * tree.radius[i] - 4.0f / 6 * texel * texel;
     const float r = std::max(std::sqrt(std::max(widened, 0.0f)), kLeastRadius * texel);
     map.radius[i] = r;
     map.scale[i] = tree.peak[i] * (tree.radius[i] / r) * (tree.radius[i] / r);
