@@ -69,9 +69,9 @@ void holdFourierMaps(Contest& contest, const Task& task, const Options& options)
 
 void holdGrids(Contest& contest, const Task& task, const Options& options) {
   std::vector<std::vector<Peer>> series;
-  for (const float step : {2.0f, 1.0f}) {
+  for (const float step : {2.0f, 3.0f, 4.0f, 1.0f}) {
     series.emplace_back();
-    for (const int size : {32, 48, 64, 96, 128, 192, 256, 384, 512})
+    for (const int size : {32, 48, 64, 80, 96, 112, 128, 144, 160, 176, 192, 224, 256, 320, 384, 448, 512})
       series.back().push_back(gridPeer(task, {.size = size, .step = step}));
   }
   holdCheapest(contest, std::move(series), "OpenVDB grid and march", options);
