@@ -17,7 +17,8 @@ spec.loader.exec_module(plot_scaling)
 
 def run(series, count, seconds_a, ratio, passed=True):
     return {"name": "%s, %d" % (series, count), "count": count, "count_a": 1000, "a": "on 1000 particles", "b": series,
-            "seconds_a": seconds_a, "ratio_median": ratio, "ratio_min": ratio / 2, "ratio_max": 2 * ratio,
+            "seconds_a": seconds_a, "core_seconds_a": [1, 1], "core_seconds_b": [4, 4],
+            "ratio_median": ratio, "ratio_min": ratio / 2, "ratio_max": 2 * ratio,
             "check": {"text": "", "passed": passed}}
 
 
@@ -51,6 +52,7 @@ class PlotScalingTest(unittest.TestCase):
                          [("grid", 1000), ("grid", 2000), ("grid", 4000), ("grid & co", 1000), ("grid & co", 2000)])
         self.assertEqual([float(row["ns_per_particle"]) for row in rows], [100, 100, 150, 1000, 1000])
         self.assertEqual([float(row["relative"]) for row in rows], [1, 1, 1.5, 1, 1])
+        self.assertEqual([float(row["relative_cpu"]) for row in rows], [1, 2, 1, 1, 2])
         self.assertEqual((float(rows[2]["relative_min"]), float(rows[2]["relative_max"])), (0.75, 3))
 
     def test_PlotHasALineOfEachSeriesThatRisesWithTheTime(self):
@@ -68,7 +70,8 @@ class PlotScalingTest(unittest.TestCase):
         self.assertIn("grid & co", [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")])
 
     def test_LeavesOutWhatFailedItsCheck(self):
-        failed = {"benchmark": "scaling", "runs": [run("grid", 2000, [1e-4], 2), run("grid", 4000, [], 0, passed=False)]}
+        failed = {"benchmark": "scaling",
+                  "runs": [run("grid", 2000, [1e-4], 2), run("grid", 4000, [], 0, passed=False)]}
         _, out, _ = self.plot(failed)
         self.assertEqual([row["particles"] for row in csv.DictReader(io.StringIO(out))], ["1000", "2000"])
 

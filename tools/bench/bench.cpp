@@ -154,9 +154,7 @@ Bench::Bench(const std::string& name, const BenchOptions& options, const CommonO
 }
 
 const Comparison* Bench::compare(const std::string& name, const std::string& unit, const Contender& a,
-                                 const std::optional<Contender>& b, const std::function<BenchCheck()>& check,
-                                 int mostRuns) {
-  const int runs = std::min(options_.runs, mostRuns);
+                                 const std::optional<Contender>& b, const std::function<BenchCheck()>& check) {
   Comparison comparison;
   comparison.name = name;
   comparison.unit = unit;
@@ -164,12 +162,12 @@ const Comparison* Bench::compare(const std::string& name, const std::string& uni
   comparison.countB = !b ? comparison.countA : b->count != 0 ? b->count : options_.count;
   comparison.a = a.name;
   if (b) comparison.b = b->name;
-  Progress progress(name, 1 + runs);
+  Progress progress(name, 1 + options_.runs);
   runOnce(a);
   if (b) runOnce(*b);
   progress.advance(1);
   comparison.check = check();
-  for (int run = 0; run < runs && comparison.check.passed; ++run) {
+  for (int run = 0; run < options_.runs && comparison.check.passed; ++run) {
     time(a, comparison.secondsA, comparison.coreA);
     if (b) time(*b, comparison.secondsB, comparison.coreB);
     progress.advance(1);

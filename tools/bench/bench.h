@@ -6,7 +6,6 @@
 #pragma once
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -73,10 +72,9 @@ class Bench {
   const Device* device() const { return gpu_ ? &gpu_->device() : nullptr; }
 
   /// Runs both once, checks, and if that passes times them; prints. The result is null where the check failed; it is
-  /// valid until the next call. `mostRuns`: no more timed runs than that, for what takes minutes.
+  /// valid until the next call.
   const Comparison* compare(const std::string& name, const std::string& unit, const Contender& a,
-                            const std::optional<Contender>& b, const std::function<BenchCheck()>& check,
-                            int mostRuns = std::numeric_limits<int>::max());
+                            const std::optional<Contender>& b, const std::function<BenchCheck()>& check);
 
   void addFloor(Floor floor) { floors_.push_back(std::move(floor)); }
 

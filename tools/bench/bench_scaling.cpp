@@ -25,7 +25,6 @@ constexpr double kOpticalDepth = 4;    // as the default of a scene
 constexpr double kError = 0.01;        // mean |ΔT|
 constexpr double kRounding = 2e-5;     // |ΔT| that is left without a cutoff, as in mote crosscheck
 constexpr std::uint64_t kProbes = 32;  // rays summed over all particles: seconds at 32 M
-constexpr int kFewRuns = 1;            // timed runs of exact sums beyond the middle, which take minutes
 constexpr double kMostRise = 1.3;      // the floor
 
 /// What buildOctree takes.
@@ -152,7 +151,6 @@ struct Series {
   std::string name;
   void (Lit::*work)();
   BenchCheck (Lit::*check)() const;
-  bool slow = false;
   std::vector<double> relative{1};
 
   /// The greatest rise from a cloud to a larger one.
@@ -166,18 +164,16 @@ struct Series {
   }
 };
 
-void timeAgainst(Bench& bench, Series& series, Lit& smallest, Lit& larger, bool beyondMiddle) {
+void timeAgainst(Bench& bench, Series& series, Lit& smallest, Lit& larger) {
   const auto contender = [&](Lit& lit, const std::string& name) {
     return Contender{.name = name, .work = [&] { (lit.*series.work)(); }, .count = lit.count()};
   };
-  const Comparison* times = bench.compare(
-      fmt::format("{}, {}", series.name, larger.count()), "particles",
-      contender(smallest, fmt::format("on {} particles", smallest.count())), contender(larger, series.name),
-      [&] {
-        const BenchCheck check = (smallest.*series.check)();
-        return check.passed ? (larger.*series.check)() : check;
-      },
-      series.slow && beyondMiddle ? kFewRuns : std::numeric_limits<int>::max());
+  const Comparison* times = bench.compare(fmt::format("{}, {}", series.name, larger.count()), "particles",
+                                          contender(smallest, fmt::format("on {} particles", smallest.count())),
+                                          contender(larger, series.name), [&] {
+                                            const BenchCheck check = (smallest.*series.check)();
+                                            return check.passed ? (larger.*series.check)() : check;
+                                          });
   if (times)
     series.relative.push_back(median(times->ratios()) * static_cast<double>(smallest.count()) /
                               static_cast<double>(larger.count()));
@@ -188,12 +184,12 @@ void timeAgainst(Bench& bench, Series& series, Lit& smallest, Lit& larger, bool 
 void benchScaling(Bench& bench) {
   const LightingOptions options;
   std::vector<Series> all{{"octree build", &Lit::build, &Lit::checkTree},
-                          {"exact lighting", &Lit::lightExactly, &Lit::checkExact, true},
+                          {"exact lighting", &Lit::lightExactly, &Lit::checkExact},
                           {fmt::format("lighting, error {}", kError), &Lit::lightWithin, &Lit::checkWithin}};
   Lit smallest(makeCloud(std::max<std::uint64_t>(bench.count() >> kDoublings, 2), 0, options.falloff), options);
   for (int doublings = 1; doublings <= kDoublings; ++doublings) {
     Lit larger(makeCloud(bench.count() >> (kDoublings - doublings), smallest.radius(), options.falloff), options);
-    for (Series& series : all) timeAgainst(bench, series, smallest, larger, doublings > kMiddle);
+    for (Series& series : all) timeAgainst(bench, series, smallest, larger);
   }
   for (const Series& series : all)
     if (series.work != &Lit::build && series.relative.size() == kDoublings + 1)

@@ -4,7 +4,8 @@
   tools/bench/plot_scaling.py REPORT.json [--csv OUT.csv] [--svg OUT.svg]
 
 Every cloud was timed in turn with the smallest one, so its time per particle is the median of the ratios times that of
-the smallest, which is the median over the whole report. Standard library only.
+the smallest, which is the median over the whole report. relative_cpu is of the CPU time over all threads, which others
+on the machine disturb least. Standard library only.
 Exit code: 0, 2 where the report is not one of `mote bench scaling` or has not been timed.
 """
 import argparse
@@ -19,7 +20,7 @@ from xml.sax.saxutils import escape
 WIDTH, HEIGHT = 640, 400
 LEFT, RIGHT, TOP, BOTTOM = 70, 190, 20, 50  # margins; the right one holds the legend
 COLOURS = ["#1b6ca8", "#c0392b", "#2e7d32", "#7b1fa2"]
-COLUMNS = ["series", "particles", "ns_per_particle", "relative", "relative_min", "relative_max"]
+COLUMNS = ["series", "particles", "ns_per_particle", "relative", "relative_min", "relative_max", "relative_cpu"]
 
 
 class ReportError(Exception):
@@ -30,7 +31,7 @@ def rows_of(report):
     """Rows as COLUMNS has them, series by series, each from its smallest cloud on."""
     try:
         if report["benchmark"] != "scaling":
-            raise ReportError("a report of mote bench scaling is wanted, this is one of mote bench " + report["benchmark"])
+            raise ReportError("a report of bench scaling is wanted, this is one of mote bench " + report["benchmark"])
         series = {}
         for run in report["runs"]:
             if run["check"]["passed"]:
@@ -39,12 +40,14 @@ def rows_of(report):
         for name, runs in series.items():
             smallest = runs[0]["count_a"]
             nanoseconds = statistics.median(s for run in runs for s in run["seconds_a"]) / smallest * 1e9
-            rows.append([name, smallest, nanoseconds, 1.0, 1.0, 1.0])
+            rows.append([name, smallest, nanoseconds, 1.0, 1.0, 1.0, 1.0])
             for run in runs:
                 scale = run["count_a"] / run["count"]
                 ratio, least, most = (run[key] * scale for key in ("ratio_median", "ratio_min", "ratio_max"))
-                rows.append([name, run["count"], ratio * nanoseconds, ratio, least, most])
-    except (KeyError, TypeError, IndexError) as error:
+                core_a, core_b = (statistics.median(run[key]) for key in ("core_seconds_a", "core_seconds_b"))
+                cpu = core_b / core_a * scale if core_a > 0 else math.nan
+                rows.append([name, run["count"], ratio * nanoseconds, ratio, least, most, cpu])
+    except (KeyError, TypeError, IndexError, statistics.StatisticsError) as error:
         raise ReportError("not a report of mote bench scaling: %s %s" % (type(error).__name__, error)) from error
     if not rows:
         raise ReportError("nothing was timed")
