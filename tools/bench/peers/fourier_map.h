@@ -16,14 +16,15 @@ struct FourierMapOptions {
   bool thick = true;  ///< particles are chords in depth; false: points, as in the paper
 };
 
-/// Optical depth from every slot toward the light, for falloff smooth and one channel. What the paper leaves to whoever
-/// writes it: kernels are scaled such that their samples at the texels keep their integral, none is narrower than a
-/// texel's width, and a particle's own share is taken off its sum
-/// again. Throws InputError for a point light that does
-/// not lie outside of the particles. Splats go by tiles of 16 × 16 texels, all on TBB and Google Highway.
+/// Optical depth from every slot toward the light, before shadowDensity, for falloff smooth and one channel. What the
+/// paper leaves to whoever writes it: kernels are scaled such that their samples at the texels keep their integral and
+/// narrowed by half of what the interpolation widens them, none is narrower than a texel, and a particle's own share is
+/// taken off its sum again. Splats go by tiles of 16 × 16 texels, all on TBB and Google Highway. Throws InputError for
+/// a point light that does not lie outside of the particles. Beside map and result 32 bytes a particle and 4 for each
+/// tile that it touches.
 std::vector<float> fourierMapDepths(const Octree& tree, const layout::Light& light, const FourierMapOptions& options);
 
-/// Bytes of the map.
+/// Bytes of the map, at most: of a square one.
 std::size_t fourierMapBytes(const FourierMapOptions& options);
 
 }  // namespace mote

@@ -1,6 +1,4 @@
 // What a contender is: something that gives each particle's optical depth toward a light.
-//
-// A new contender (an approximation of Mote's own, say) is one more Peer in main.cpp's list.
 #pragma once
 #include <functional>
 #include <string>
