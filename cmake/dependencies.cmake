@@ -20,3 +20,12 @@ pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
 find_file(VOLK_SOURCE volk.c PATHS /usr/include REQUIRED)
 add_library(volk STATIC ${VOLK_SOURCE})
 target_link_libraries(volk PUBLIC Vulkan::Headers ${CMAKE_DL_LIBS})
+
+# mote_peers alone. OpenVDB's own find module demands Boost's libraries too, which it was built with and we do not use.
+if(MOTE_PEERS)
+  find_path(OPENVDB_INCLUDE openvdb/openvdb.h REQUIRED)
+  find_library(OPENVDB_LIBRARY openvdb REQUIRED)
+  add_library(OpenVDB::openvdb UNKNOWN IMPORTED)
+  set_target_properties(OpenVDB::openvdb PROPERTIES IMPORTED_LOCATION ${OPENVDB_LIBRARY}
+    INTERFACE_INCLUDE_DIRECTORIES ${OPENVDB_INCLUDE} INTERFACE_LINK_LIBRARIES TBB::tbb)
+endif()

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that Mote is built from and tested with, as far as they are missing.
+# tools/setup.sh --peers   also what mote_peers (-DMOTE_PEERS=ON) is built from.
 # Needs root or sudo, and only where something is missing; no terminal. MOTE_NO_SETUP=1 leaves the machine as it is.
 set -euo pipefail
 
@@ -9,8 +10,13 @@ packages=(
   glslang-tools spirv-tools
   libglm-dev libtbb-dev libopenexr-dev libpng-dev zlib1g-dev libssl-dev
   libassimp-dev libembree-dev libcli11-dev nlohmann-json3-dev libfmt-dev libhwy-dev libgtest-dev
-  imagemagick fonts-dejavu-core
+  imagemagick fonts-dejavu-core python3
 )
+if [[ $# -gt 1 || ( $# -eq 1 && "$1" != --peers ) ]]; then
+  printf 'usage: tools/setup.sh [--peers]   (got "%s")\n' "$*" >&2
+  exit 2
+fi
+if [[ $# -eq 1 ]]; then packages+=(libopenvdb-dev libboost-dev); fi
 
 # One line a package that dpkg knows, "g++ ii "; those it does not know are missing as well.
 missing_packages() {

@@ -1,5 +1,6 @@
 // mote bench: tiny runs of each, for what it checks, prints and reports; how fast anything is, no test says.
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/mote_program.h"
@@ -75,12 +76,48 @@ TEST(BenchCommand, HoldsTheFiguresAgainstTheFloors) {
     const double value = floor["value"], limit = floor["limit"];
     EXPECT_EQ(floor["reached"], floor["wanted"] == "at least" ? value >= limit : value <= limit) << floor;
   }
-  const Json &build = root["runs"][0], &equal = root["runs"][1], &varying = root["runs"][2], &lighting = root["runs"][3];
+  const Json &build = root["runs"][0], &equal = root["runs"][1], &varying = root["runs"][2],
+             &lighting = root["runs"][3];
   EXPECT_DOUBLE_EQ(root["floors"][0]["value"].get<double>(), middle(build["seconds_b"]) / 3000 * 1e6);
   EXPECT_EQ(root["floors"][1]["value"], equal["ratio_median"]);
   EXPECT_EQ(root["floors"][2]["value"], varying["ratio_median"]);
   EXPECT_DOUBLE_EQ(root["floors"][3]["value"].get<double>(), 3000 / middle(lighting["seconds_a"]) * 1e-6);
   EXPECT_EQ(root["floors"][4]["value"], lighting["ratio_median"]);
+}
+
+/// Seconds a particle, relative to the smallest cloud's.
+double relativeTime(const Json& run) {
+  return run["ratio_median"].get<double>() * run["count_a"].get<double>() / run["count"].get<double>();
+}
+
+TEST(BenchCommand, ScalingHoldsEveryCloudAgainstTheSmallest) {
+  const TempFolder folder;
+  const std::string report = folder.file("report.json");
+  const ProcessResult result = mote(
+      {"bench", "scaling", "--count", "6400", "--runs", std::to_string(kRuns), "--report", report}, kWithoutVulkan);
+  ASSERT_EQ(result.exitCode, 0) << result.out << result.err;
+  const Json root = readJson(report);
+  ASSERT_EQ(root["runs"].size(), 18u);  // six doublings of tree, exact sums and an error of 0.01
+  std::map<std::string, std::vector<double>> relative;
+  for (std::size_t i = 0; i < 18; ++i) {
+    const Json& run = root["runs"][i];
+    EXPECT_EQ(run["check"]["passed"], true) << run;
+    EXPECT_EQ(run["count_a"], 100);
+    EXPECT_EQ(run["count"], 200 << i / 3) << run;
+    expectBothTimed(run);
+    auto [place, first] = relative.try_emplace(run["b"], std::vector<double>{1});
+    place->second.push_back(relativeTime(run));
+  }
+  ASSERT_EQ(root["floors"].size(), 2u);
+  const std::vector<std::string> floors{"exact lighting", "lighting, error 0.01"};
+  for (std::size_t f = 0; f < 2; ++f) {
+    const std::vector<double>& times = relative.at(floors[f]);
+    double rise = 0;
+    for (std::size_t i = 0; i < times.size(); ++i)
+      for (std::size_t j = i; j < times.size(); ++j) rise = std::max(rise, times[j] / times[i]);
+    EXPECT_DOUBLE_EQ(root["floors"][f]["value"].get<double>(), rise);
+    EXPECT_EQ(root["floors"][f]["limit"], 1.3);
+  }
 }
 
 TEST(BenchCommand, LeavesTheDevicesHalvesOutWhereThereIsNone) {

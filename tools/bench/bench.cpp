@@ -28,6 +28,8 @@ struct Benchmark {
 constexpr Benchmark kBenchmarks[] = {
     {"lighting", "Build of the octree, and lighting on TBB against the compute shader", "particles", 1'000'000,
      benchLighting},
+    {"scaling", "Time per particle of octree and lighting at a fixed radius, from 1/64 of the particles to all of them",
+     "particles", 32'000'000, benchScaling},
     {"sort", "tbb::parallel_sort against the bitonic sort on the device", "pairs", 1 << 20, benchSort},
     {"splat", "Rasteriser on TBB against the splat pass on the device", "splats", 1'000'000, benchSplat},
 };
@@ -60,18 +62,18 @@ std::string spread(const std::vector<double>& values, const char* unit) {
 std::string rate(double count, double seconds) { return fmt::format("{:.4g} M/s", count / seconds * 1e-6); }
 
 void print(const Comparison& comparison) {
-  const auto count = static_cast<double>(comparison.count);
-  fmt::print("\n{}, {} {}\n", comparison.name, comparison.count, comparison.unit);
+  fmt::print("\n{}, {} {}\n", comparison.name, comparison.countB, comparison.unit);
   fmt::print("  check  {}: {}\n", comparison.check.text, comparison.check.passed ? "ok" : "DIFFERS");
   if (!comparison.check.passed) fmt::print("  not timed, because the results are wrong\n");
-  const auto contender = [&](char letter, const std::string& name, const std::vector<double>& seconds,
-                             const std::vector<double>& core) {
-    fmt::print("  {}      {:<39} {:>13}  {:<32}  {:.4g} core-s\n", letter, name, rate(count, median(seconds)),
-               spread(seconds, " s"), median(core));
+  const auto contender = [&](char letter, const std::string& name, std::uint64_t count,
+                             const std::vector<double>& seconds, const std::vector<double>& core) {
+    fmt::print("  {}      {:<39} {:>13}  {:<32}  {:.4g} core-s\n", letter, name,
+               rate(static_cast<double>(count), median(seconds)), spread(seconds, " s"), median(core));
   };
-  if (!comparison.secondsA.empty()) contender('A', comparison.a, comparison.secondsA, comparison.coreA);
+  if (!comparison.secondsA.empty())
+    contender('A', comparison.a, comparison.countA, comparison.secondsA, comparison.coreA);
   if (comparison.secondsB.empty()) return;
-  contender('B', comparison.b, comparison.secondsB, comparison.coreB);
+  contender('B', comparison.b, comparison.countB, comparison.secondsB, comparison.coreB);
   fmt::print("  B / A  {}\n", spread(comparison.ratios(), ""));
 }
 
@@ -83,7 +85,8 @@ void print(const Floor& floor) {
 Json toJson(const Comparison& comparison) {
   Json json = {{"name", comparison.name},
                {"unit", comparison.unit},
-               {"count", comparison.count},
+               {"count", comparison.countB},
+               {"count_a", comparison.countA},
                {"a", comparison.a},
                {"b", nullptr},
                {"ratio_median", nullptr},
@@ -155,7 +158,8 @@ const Comparison* Bench::compare(const std::string& name, const std::string& uni
   Comparison comparison;
   comparison.name = name;
   comparison.unit = unit;
-  comparison.count = options_.count;
+  comparison.countA = a.count != 0 ? a.count : options_.count;
+  comparison.countB = !b ? comparison.countA : b->count != 0 ? b->count : options_.count;
   comparison.a = a.name;
   if (b) comparison.b = b->name;
   Progress progress(name, 1 + options_.runs);

@@ -27,6 +27,7 @@ struct Contender {
   std::string name;
   std::function<void()> work;          ///< timed
   std::function<void()> prepare = {};  ///< before each run, not timed
+  std::uint64_t count = 0;             ///< of what it works on; 0: the benchmark's own
 };
 
 /// Whether the contenders' results are right, and how that was seen.
@@ -38,7 +39,7 @@ struct BenchCheck {
 /// The seconds of one benchmark; without B where there is nothing to run it on.
 struct Comparison {
   std::string name, unit;  ///< unit: of what `count` counts
-  std::uint64_t count = 0;
+  std::uint64_t countA = 0, countB = 0;
   std::string a, b;
   BenchCheck check;
   std::vector<double> secondsA, secondsB;  ///< wall clock
@@ -91,8 +92,10 @@ class Bench {
   std::vector<Floor> floors_;
 };
 
-// Each runs one of `mote bench …`: lighting and octree, the bitonic sort, the splat pass.
+// Each runs one of `mote bench …`: lighting and octree, time per particle against particles, the bitonic sort, the
+// splat pass.
 void benchLighting(Bench& bench);
+void benchScaling(Bench& bench);
 void benchSort(Bench& bench);
 void benchSplat(Bench& bench);
 

@@ -1,0 +1,88 @@
+"""tools/bench/plot_scaling.py on a report whose times are known."""
+import contextlib
+import csv
+import importlib.util
+import io
+import json
+import os
+import tempfile
+import unittest
+import xml.etree.ElementTree
+
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+spec = importlib.util.spec_from_file_location("plot_scaling", os.path.join(ROOT, "tools", "bench", "plot_scaling.py"))
+plot_scaling = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(plot_scaling)
+
+
+def run(series, count, seconds_a, ratio, passed=True):
+    return {"name": "%s, %d" % (series, count), "count": count, "count_a": 1000, "a": "on 1000 particles", "b": series,
+            "seconds_a": seconds_a, "core_seconds_a": [1, 1], "core_seconds_b": [4, 4],
+            "ratio_median": ratio, "ratio_min": ratio / 2, "ratio_max": 2 * ratio,
+            "check": {"text": "", "passed": passed}}
+
+
+# 100 ns a particle at 1000; at 2000 as much, at 4000 one and a half times as much.
+REPORT = {"benchmark": "scaling", "runs": [run("grid", 2000, [9e-5, 1e-4], 2), run("grid & co", 2000, [1e-3], 2),
+                                           run("grid", 4000, [1e-4, 2e-4], 6)]}
+
+
+class PlotScalingTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def plot(self, report, *flags):
+        with open(self.path("report.json"), "w", encoding="utf-8") as file:
+            file.write(report if isinstance(report, str) else json.dumps(report))
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            code = plot_scaling.main(self.path("report.json"), *flags)
+        return code, out.getvalue(), err.getvalue()
+
+    def test_TableHasTheTimePerParticleOfEachCloud(self):
+        code, out, err = self.plot(REPORT)
+        self.assertEqual((code, err), (0, ""))
+        rows = list(csv.DictReader(io.StringIO(out)))
+        self.assertEqual([(row["series"], int(row["particles"])) for row in rows],
+                         [("grid", 1000), ("grid", 2000), ("grid", 4000), ("grid & co", 1000), ("grid & co", 2000)])
+        self.assertEqual([float(row["ns_per_particle"]) for row in rows], [100, 100, 150, 1000, 1000])
+        self.assertEqual([float(row["relative"]) for row in rows], [1, 1, 1.5, 1, 1])
+        self.assertEqual([float(row["relative_cpu"]) for row in rows], [1, 2, 1, 1, 2])
+        self.assertEqual((float(rows[2]["relative_min"]), float(rows[2]["relative_max"])), (0.75, 3))
+
+    def test_PlotHasALineOfEachSeriesThatRisesWithTheTime(self):
+        code, out, _ = self.plot(REPORT, "--svg", self.path("plot.svg"), "--csv", self.path("plot.csv"))
+        self.assertEqual((code, out), (0, ""))
+        self.assertTrue(os.path.getsize(self.path("plot.csv")) > 0)
+        root = xml.etree.ElementTree.parse(self.path("plot.svg")).getroot()
+        lines = root.findall("{http://www.w3.org/2000/svg}polyline")
+        self.assertEqual(len(lines), 2)
+        points = [tuple(map(float, point.split(","))) for point in lines[0].get("points").split()]
+        self.assertEqual(len(points), 3)
+        self.assertAlmostEqual(points[1][0] - points[0][0], points[2][0] - points[1][0], delta=0.2)  # doublings
+        self.assertEqual(points[0][1], points[1][1])
+        self.assertLess(points[2][1], points[1][1])
+        self.assertIn("grid & co", [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")])
+
+    def test_LeavesOutWhatFailedItsCheck(self):
+        failed = {"benchmark": "scaling",
+                  "runs": [run("grid", 2000, [1e-4], 2), run("grid", 4000, [], 0, passed=False)]}
+        _, out, _ = self.plot(failed)
+        self.assertEqual([row["particles"] for row in csv.DictReader(io.StringIO(out))], ["1000", "2000"])
+
+    def test_RejectsWhatIsNoReportOfScaling(self):
+        nothing = {"benchmark": "scaling", "runs": []}
+        for report, words in (({"benchmark": "sort", "runs": []}, "mote bench sort"), ({"runs": 3}, "benchmark"),
+                              ([], "not a report"), ("{", "report.json"), (nothing, "nothing was timed")):
+            code, out, err = self.plot(report)
+            self.assertEqual((code, out), (2, ""))
+            self.assertIn(words, err)
+
+
+if __name__ == "__main__":
+    unittest.main()
