@@ -2,27 +2,39 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <bit>
+#include <cstdlib>
 
 #include "host/core/log.h"
 #include "host/core/parallel.h"
-#include "host/lighting/packet.h"
-#include "host/lighting/ray_order.h"
+#include "host/lighting/beam.h"
 #include "spirv.h"
 
 namespace mote {
+
+/// Everything that depends on the kind of device.
+struct LightPass::Tuning {
+  BeamLimits beams;
+  std::uint32_t groupSize;     ///< a multiple of every subgroup size
+  std::uint32_t raysEach;      ///< of an invocation
+  std::uint32_t block;         ///< particles
+  bool broadcast;              ///< lanes load one of the block each
+  std::uint32_t foundCapacity, chosenCapacity;
+  std::uint32_t pieceColumns, pieceBeams, pieceRays;  ///< at most; beams and rays may be passed by one column's
+};
+
 namespace {
 
-/// A multiple of every subgroup size there is (4–64), so that no subgroup is partly empty.
-constexpr std::uint32_t kGroupSize = 64;
-/// Rays an invocation: hardware hides latency with occupancy, which registers limit; lavapipe has no latency to hide
-/// and wants each load to serve many rays (measured: 1 → 2×, 2 → 1.35×, 4 → 1.08×, 8 → 1× the time).
-constexpr std::uint32_t kRaysOnCpu = 8, kRaysOnHardware = 1;
-/// Rays a submission: seconds at most, so that no watchdog of a display driver ends it and progress can be shown.
-constexpr std::uint32_t kRaysPerSubmit = 1 << 17;
+/// From a point of a column's frame, particles farther than this many least radii are placed in double.
+constexpr double kExactRadii = 128;
 
-std::uint32_t raysPerInvocation(const Device& device) { return device.isCpu() ? kRaysOnCpu : kRaysOnHardware; }
+std::uint32_t knob(const char* name, std::uint32_t value) {
+  const char* text = std::getenv(name);
+  return text ? static_cast<std::uint32_t>(std::atoi(text)) : value;
+}
 
-/// Points as (x, y, z, w) with w from `fourth` (empty: 0), interleaved in pieces: no second copy of all on the host.
+/// Points as (x, y, z, w) with w from `fourth`, interleaved in pieces: no second copy of all on the host.
 Buffer uploadPoints(const Device& device, const Receivers& points, std::span<const float> fourth) {
   constexpr std::size_t kPiece = 1 << 20;
   Buffer buffer = device.createBuffer(points.size() * sizeof(vec4));
@@ -30,52 +42,116 @@ Buffer uploadPoints(const Device& device, const Receivers& points, std::span<con
   for (std::size_t begin = 0; begin < points.size(); begin += kPiece) {
     piece.resize(std::min(kPiece, points.size() - begin));
     parallelBlocks(piece.size(), 1 << 14, [&](std::size_t first, std::size_t last) {
-      for (std::size_t i = first; i < last; ++i)
-        piece[i] = vec4(points.position(begin + i), fourth.empty() ? 0.0f : fourth[begin + i]);
+      for (std::size_t i = first; i < last; ++i) piece[i] = vec4(points.position(begin + i), fourth[begin + i]);
     });
     device.upload<vec4>(buffer, piece, begin);
   }
   return buffer;
 }
 
+vec3 lowPart(const dvec3& value) { return vec3(value - dvec3(vec3(value))); }
+float lowPart(double value) { return static_cast<float>(value - static_cast<double>(static_cast<float>(value))); }
+
+/// `amid`: the middle of the tree. Returns also how far from there the frame's numbers start.
+layout::LightColumn headerOf(const Column& column, const dvec3& amid) {
+  const LightFrame& frame = column.frame;
+  layout::LightColumn header{};
+  header.planeOrigin = column.planes.origin;
+  header.depthBase = static_cast<float>(column.depthBase), header.depthBaseLow = lowPart(column.depthBase);
+  header.middle = vec3(frame.origin + glm::dot(amid - frame.origin, frame.axis) * frame.axis);
+  const dvec3 offset = dvec3(header.middle) - frame.origin;
+  header.u = vec3(frame.u), header.uLow = lowPart(frame.u);
+  header.v = vec3(frame.v), header.vLow = lowPart(frame.v);
+  header.axis = vec3(frame.axis), header.axisLow = lowPart(frame.axis);
+  const dvec3 place(glm::dot(offset, frame.u), glm::dot(offset, frame.v), glm::dot(offset, frame.axis));
+  header.middleU = static_cast<float>(place.x), header.middleULow = lowPart(place.x);
+  header.middleV = static_cast<float>(place.y), header.middleVLow = lowPart(place.y);
+  header.middleZ = static_cast<float>(place.z), header.middleZLow = lowPart(place.z);
+  return header;
+}
+
+layout::LightBeam headerOf(const Beam& beam, const Column& column) {
+  layout::LightBeam header{};
+  header.extentScale = beam.extentScale;
+  header.lowU = beam.lowU, header.highU = beam.highU, header.lowV = beam.lowV, header.highV = beam.highV;
+  header.turnU = vec3(beam.turn[0][0], beam.turn[0][1], beam.turn[0][2]);
+  header.turnV = vec3(beam.turn[1][0], beam.turn[1][1], beam.turn[1][2]);
+  header.turnW = vec3(beam.turn[2][0], beam.turn[2][1], beam.turn[2][2]);
+  header.margin = column.margin;
+  header.depthBase = static_cast<float>(column.depthBase);
+  return header;
+}
+
+layout::LightRay rayOf(const BeamRays& rays, std::size_t k) {
+  return {rays.u[k], rays.v[k], rays.depth[k], rays.self[k], rays.uLow[k], rays.vLow[k], rays.depthLow[k]};
+}
+
 }  // namespace
 
-LightPass::LightPass(const Device& device, layout::uint falloff, layout::uint endpoint)
-    : device_(device),
-      queries_(device.createTimestampQueries(1)),
-      falloff_(falloff),
-      endpoint_(endpoint),
-      raysPerGroup_(kGroupSize * raysPerInvocation(device)) {}
-
-const ComputePipeline& LightPass::pipeline(bool ownSlots) {
-  std::optional<ComputePipeline>& pipeline = ownSlots ? ownSlots_ : others_;
-  if (!pipeline) {
-    const std::array constants{SpecializationConstant{0, kGroupSize},
-                               SpecializationConstant{1, raysPerInvocation(device_)},
-                               SpecializationConstant{2, falloff_},
-                               SpecializationConstant{3, endpoint_},
-                               SpecializationConstant{4, static_cast<std::uint32_t>(tree_->channels())},
-                               SpecializationConstant{5, ownSlots ? 1u : 0u}};
-    pipeline = device_.createComputePipeline(exact_ ? spirv::light_exact_comp : spirv::light_comp,
-                                             sizeof(layout::LightParams), constants);
+LightPass::Tuning LightPass::tuning(const Device& device) {
+  Tuning t{};
+  if (device.isCpu()) {
+    t.beams = {knob("COLUMN", 4096), knob("BEAM", 240)};
+    t.groupSize = t.block = device.subgroupSize();
+    t.broadcast = true;
+    t.raysEach = std::min(knob("RAYS", 8), t.groupSize);
+    t.foundCapacity = knob("FOUND", 8192), t.chosenCapacity = knob("CHOSEN", 2048);
+    t.pieceColumns = knob("PCOLUMNS", 32), t.pieceBeams = 512, t.pieceRays = 1 << 17;
+  } else {
+    t.beams = {1024, 256};
+    t.groupSize = std::max(64u, device.mostSubgroupSize());
+    t.block = 8;
+    t.broadcast = false;
+    t.raysEach = 2;
+    t.foundCapacity = 8192, t.chosenCapacity = 2048;
+    t.pieceColumns = 512, t.pieceBeams = 2048, t.pieceRays = 1 << 19;
   }
-  return *pipeline;
+  return t;
+}
+
+std::uint64_t LightPass::Buffers::bytes() const {
+  std::uint64_t sum = 0;
+  for (const Buffer* buffer :
+       {&columns, &planes, &walks, &beams, &rays, &depths, &found, &order, &chosen, &chosenIndex})
+    sum += buffer->size();
+  return sum;
+}
+
+LightPass::LightPass(const Device& device, layout::uint falloff, layout::uint endpoint)
+    : device_(device), queries_(device.createTimestampQueries(2)), falloff_(falloff), endpoint_(endpoint) {}
+
+const LightPass::Pipelines& LightPass::pipelines(const Variant& variant) {
+  Pipelines& made = pipelines_[variant];
+  if (made.sum.handle() != VK_NULL_HANDLE) return made;
+  const Tuning t = tuning(device_);
+  std::vector<SpecializationConstant> constants{{0, t.groupSize},
+                                                {1, static_cast<std::uint32_t>(tree_->channels())},
+                                                {2, variant.perspective},
+                                                {3, variant.careful},
+                                                {4, t.foundCapacity},
+                                                {5, t.chosenCapacity},
+                                                {6, device_.mostSubgroupSize()}};
+  made.gather = device_.createComputePipeline(variant.exact ? spirv::light_gather_exact_comp : spirv::light_gather_comp,
+                                              sizeof(layout::LightParams), constants);
+  constants.insert(constants.end(), {{7, t.raysEach}, {8, falloff_}, {9, endpoint_}, {10, t.block}, {11, t.broadcast}});
+  for (const std::uint32_t on : {0u, 1u}) {
+    constants.push_back({12, on});
+    (on ? made.sumOn : made.sum) =
+        device_.createComputePipeline(spirv::light_sum_comp, sizeof(layout::LightParams), constants);
+    constants.pop_back();
+  }
+  return made;
 }
 
 void LightPass::setTree(const Octree& tree) {
   tree_ = &tree;
-  ownSlots_.reset(), others_.reset();
-  const bool small = glm::length(tree.bounds().size()) > packetRules(tree, {}).farDistance;
-  if (small && !device_.hasFloat64())
-    logVerbose("this device has no shaderFloat64: particles beyond 256 of the smallest radius are lit less exactly");
-  exact_ = small && device_.hasFloat64();
+  pipelines_.clear();
   const std::size_t count = tree.particleCount();
   nodes_ = device_.createBufferWith<layout::Node>(tree.nodes);
-  peaks_ = device_.createBufferWith<float>(std::span(tree.peak).first(count));
-  if (tree.channels() == 3) {
-    peaksGreen_ = device_.createBufferWith<float>(std::span(tree.peakGreen).first(count));
-    peaksBlue_ = device_.createBufferWith<float>(std::span(tree.peakBlue).first(count));
-  }
+  peaks_ = device_.createBuffer(tree.channels() * count * sizeof(float));
+  const std::vector<float>* peaks[] = {&tree.peak, &tree.peakGreen, &tree.peakBlue};
+  for (std::size_t c = 0; c < tree.channels(); ++c)
+    device_.upload<float>(peaks_, std::span(*peaks[c]).first(count), c * count);
   particles_ = uploadPoints(device_, slotsOf(tree), tree.radius);
 }
 
@@ -89,60 +165,136 @@ std::vector<float> LightPass::opticalDepths(const Receivers& receivers, const la
                                             const RaysDone& done) {
   MOTE_CHECK(options.falloff, ==, falloff_);
   MOTE_CHECK(options.endpoint, ==, endpoint_);
-  const std::size_t count = receivers.size(), numbers = tree_->channels() * count;
-  if (shadowless(light) || tree_->particleCount() == 0) return std::vector<float>(numbers, 0.0f);
-  const std::vector<std::uint32_t> rays = rayOrder(receivers, light, reached);
-  if (rays.empty()) return std::vector<float>(numbers, 0.0f);
-
-  const bool ownSlots = receivers.self.empty() && receivers.x.data() == tree_->x.data();
-  Buffer origins, selves;
-  if (!ownSlots) {
-    std::vector<std::uint32_t> self(count);
-    for (std::size_t k = 0; k < count; ++k) self[k] = receivers.selfOf(k);
-    origins = uploadPoints(device_, receivers, {});
-    selves = device_.createBufferWith<std::uint32_t>(self);
+  const std::size_t count = receivers.size();
+  std::vector<float> depths(tree_->channels() * count, 0.0f);
+  if (shadowless(light) || tree_->particleCount() == 0) return depths;
+  const Tuning t = tuning(device_);
+  const Beams beams = planBeams(receivers, light, reached, tree_->meanRadius, t.beams);
+  const float limit = opticalDepthLimit(light, options);
+  for (std::size_t first = 0, last = 0; first < beams.columns(); first = last) {
+    const auto fits = [&](std::size_t end) {
+      return end - first <= t.pieceColumns && beams.column[end] - beams.column[first] <= t.pieceBeams &&
+             beams.start[beams.column[end]] - beams.start[beams.column[first]] <= t.pieceRays;
+    };
+    for (last = first + 1; last < beams.columns() && fits(last + 1);) ++last;
+    const Piece piece = setUp(receivers, light, beams, first, last);
+    const std::vector<float> sums = run(piece, limit);
+    const std::size_t rays = piece.rays.size();
+    for (std::size_t c = 0; c < tree_->channels(); ++c)
+      for (std::size_t k = 0; k < rays; ++k) depths[c * count + piece.receivers[k]] = sums[c * rays + k];
+    if (done) done(rays);
   }
-  const Buffer order = device_.createBufferWith<std::uint32_t>(rays);
-  // Receivers without a ray keep the zeros.
-  const Buffer depths = device_.createBufferWith<float>(std::vector<float>(numbers, 0.0f));
-  deviceBytes_ =
-      std::max(deviceBytes_, nodes_.size() + particles_.size() + peaks_.size() + peaksGreen_.size() +
-                                 peaksBlue_.size() + origins.size() + selves.size() + order.size() + depths.size());
-  layout::LightParams params{};
-  params.nodes = nodes_.address();
-  params.particles = particles_.address();
-  params.peaks = peaks_.address();
-  if (tree_->channels() == 3) params.peaksGreen = peaksGreen_.address(), params.peaksBlue = peaksBlue_.address();
-  params.origins = ownSlots ? particles_.address() : origins.address();
-  if (!ownSlots) params.selves = selves.address();
-  params.order = order.address();
-  params.opticalDepths = depths.address();
-  params.lightPosition = light.position;
-  params.lightType = light.type;
-  params.lightDirection = light.direction;
-  params.opticalDepthLimit = opticalDepthLimit(light, options);
-  params.nodeCount = static_cast<layout::uint>(tree_->nodeCount());
-  params.boxSlack = packetRules(*tree_, receivers.bounds()).slack;
-  params.receiverCount = static_cast<layout::uint>(count);
-  dispatch(pipeline(ownSlots), params, rays.size(), done);
-  return device_.download<float>(depths, numbers);
+  return depths;
 }
 
-void LightPass::dispatch(const ComputePipeline& pipeline, layout::LightParams params, std::size_t rays,
-                         const RaysDone& done) {
-  const auto count = static_cast<std::uint32_t>(rays);
-  for (std::uint32_t first = 0; first < count; first += params.rayCount) {
-    params.firstRay = first;
-    params.rayCount = std::min(kRaysPerSubmit, count - first);
+LightPass::Piece LightPass::setUp(const Receivers& receivers, const layout::Light& light, const Beams& beams,
+                                  std::size_t first, std::size_t last) const {
+  const std::size_t firstBeam = beams.column[first], firstRay = beams.start[firstBeam];
+  Piece piece;
+  piece.columns.resize(last - first), piece.planes.resize(8 * (last - first));
+  piece.beams.resize(beams.column[last] - firstBeam);
+  piece.rays.resize(beams.start[beams.column[last]] - firstRay), piece.receivers.resize(piece.rays.size());
+  const Bounds bounds = tree_->bounds();
+  const dvec3 amid(bounds.centre());
+  const double reach = 0.5 * glm::length(dvec3(bounds.size()));
+  const ColumnRules rules = columnRules(*tree_, light, receivers.bounds());
+  std::atomic<bool> careful = false, plain = false, exact = false;
+  const auto setColumn = [&](std::size_t c, bool alwaysCareful) {
+    static thread_local Column column;
+    static thread_local Beam beam;
+    column.setRays(receivers, light, beams.ofColumn(c), rules);
+    layout::LightColumn& header = piece.columns[c - first];
+    header = headerOf(column, amid);
+    if (column.precise || glm::distance(dvec3(header.middle), amid) + reach > kExactRadii * rules.leastRadius)
+      exact = true;
+    for (int k = 0; k < 8; ++k) {
+      const ColumnPlanes& p = column.planes;
+      piece.planes[8 * (c - first) + static_cast<std::size_t>(k)] = vec4(p.x[k], p.y[k], p.z[k], p.offset[k]);
+    }
+    for (std::size_t b = beams.column[c]; b < beams.column[c + 1]; ++b) {
+      beam.setRays(column, receivers, beams.ofBeam(b), alwaysCareful);
+      (beam.careful ? careful : plain) = true;
+      layout::LightBeam& to = piece.beams[b - firstBeam];
+      to = headerOf(beam, column);
+      to.firstRay = static_cast<layout::uint>(beams.start[b] - firstRay);
+      to.rayCount = static_cast<layout::uint>(beam.rays.receiver.size());
+      to.column = static_cast<layout::uint>(c - first);
+      for (std::size_t k = 0; k < to.rayCount; ++k) {
+        piece.rays[to.firstRay + k] = rayOf(beam.rays, k);
+        piece.receivers[to.firstRay + k] = beam.rays.receiver[k];
+      }
+    }
+  };
+  const auto setAll = [&](bool alwaysCareful) {
+    parallelBlocks(last - first, 1, [&](std::size_t c, std::size_t) { setColumn(first + c, alwaysCareful); });
+  };
+  setAll(false);
+  if (careful && plain) setAll(true);  // one pipeline serves them all
+  if (exact && !device_.hasFloat64())
+    logVerbose("this device has no shaderFloat64: particles beyond 128 of the smallest radius are lit less exactly");
+  piece.variant = {light.type != layout::kLightDirectional, careful, exact && device_.hasFloat64()};
+  return piece;
+}
+
+std::vector<float> LightPass::run(const Piece& piece, float limit) {
+  const Tuning t = tuning(device_);
+  const auto grow = [&](Buffer& buffer, std::size_t bytes) {
+    if (buffer.size() < bytes) buffer = device_.createBuffer(std::bit_ceil(bytes));
+  };
+  const std::size_t columns = piece.columns.size(), beams = piece.beams.size(), rays = piece.rays.size();
+  const std::size_t channels = tree_->channels();
+  Buffers& to = buffers_;
+  grow(to.columns, columns * sizeof(layout::LightColumn)), grow(to.planes, 8 * columns * sizeof(vec4));
+  grow(to.walks, columns * sizeof(layout::LightWalk)), grow(to.beams, beams * sizeof(layout::LightBeam));
+  grow(to.rays, rays * sizeof(layout::LightRay)), grow(to.depths, channels * rays * sizeof(float));
+  grow(to.found, columns * layout::kFoundLists * t.foundCapacity * sizeof(vec4));
+  grow(to.order, columns * (t.foundCapacity + layout::kLightBins * device_.mostSubgroupSize()) * sizeof(layout::uint));
+  grow(to.chosen, beams * layout::kChosenLists * t.chosenCapacity * sizeof(vec4));
+  grow(to.chosenIndex, beams * t.chosenCapacity * sizeof(layout::uint));
+  deviceBytes_ = std::max(deviceBytes_, nodes_.size() + particles_.size() + peaks_.size() + to.bytes());
+  device_.upload<layout::LightColumn>(to.columns, piece.columns);
+  device_.upload<vec4>(to.planes, piece.planes);
+  device_.upload<layout::LightBeam>(to.beams, piece.beams);
+  device_.upload<layout::LightRay>(to.rays, piece.rays);
+  std::vector<layout::LightWalk> walks(columns);
+  device_.upload<layout::LightWalk>(to.walks, walks);
+
+  layout::LightParams params{};
+  params.nodes = nodes_.address(), params.particles = particles_.address(), params.peaks = peaks_.address();
+  params.columns = to.columns.address(), params.planes = to.planes.address(), params.walks = to.walks.address();
+  params.beams = to.beams.address(), params.rays = to.rays.address(), params.opticalDepths = to.depths.address();
+  params.found = to.found.address(), params.order = to.order.address(), params.chosen = to.chosen.address();
+  params.chosenIndex = to.chosenIndex.address();
+  params.nodeCount = static_cast<layout::uint>(tree_->nodeCount());
+  params.columnCount = static_cast<layout::uint>(columns), params.beamCount = static_cast<layout::uint>(beams);
+  params.rayCount = static_cast<layout::uint>(rays);
+  params.opticalDepthLimit = limit;
+  params.slotCount = static_cast<layout::uint>(tree_->particleCount());
+
+  const Pipelines& with = pipelines(piece.variant);
+  // A subgroup may be as large as the device likes: enough workgroups for the largest, those beyond the last end.
+  const std::size_t eachGroup = t.groupSize / device_.mostSubgroupSize();
+  const auto unfinished = [&](const layout::LightWalk& w) { return w.slot < w.end || w.node < params.nodeCount; };
+  for (bool begins = true; begins || std::any_of(walks.begin(), walks.end(), unfinished); begins = false) {
     queries_.reset();
     device_.run([&](CommandBuffer& commands) {
-      const std::uint32_t span = queries_.begin(commands, "lighting");
-      commands.dispatchRow(pipeline, params, (params.rayCount + raysPerGroup_ - 1) / raysPerGroup_);
-      queries_.end(commands, span);
+      const std::uint32_t gather = queries_.begin(commands, "gather");
+      if (!begins) commands.barrier(barrier::computeToCompute);
+      commands.dispatchRow(with.gather, params, (columns + eachGroup - 1) / eachGroup);
+      queries_.end(commands, gather);
+      commands.barrier(barrier::computeToCompute);
+      const std::uint32_t sum = queries_.begin(commands, "sum");
+      commands.dispatchRow(begins ? with.sum : with.sumOn, params, (beams + eachGroup - 1) / eachGroup);
+      queries_.end(commands, sum);
     });
-    deviceSeconds_ += queries_.results().at(0).seconds;
-    if (done) done(params.rayCount);
+    for (const StageTime& stage : queries_.results()) {
+      deviceSeconds_ += stage.seconds;
+      if (std::getenv("SHOW")) std::fprintf(stderr, "%s %.1f ms  ", stage.stage.c_str(), stage.seconds * 1e3);
+    }
+    if (std::getenv("SHOW")) std::fprintf(stderr, "%zu columns %zu beams %zu rays\n", columns, beams, rays);
+    walks = device_.download<layout::LightWalk>(to.walks, columns);
   }
+  return device_.download<float>(to.depths, channels * rays);
 }
 
 }  // namespace mote
