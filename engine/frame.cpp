@@ -1,5 +1,6 @@
 #include "engine/frame.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/splats.h"
@@ -35,7 +36,8 @@ layout::Light toLight(const LightSource& source) {
 
 std::vector<FrameInput> hashInputs(const std::vector<std::string>& files) {
   std::vector<FrameInput> inputs;
-  for (const std::string& file : files) inputs.push_back({file, sha256OfFile(file)});
+  for (auto file = files.begin(); file != files.end(); ++file)
+    if (std::find(files.begin(), file, *file) == file) inputs.push_back({*file, sha256OfFile(*file)});
   return inputs;
 }
 
@@ -54,8 +56,10 @@ struct DensityArrays {
   }
   DensityInput input() const {
     const ParticleSet& particles = frame.particles;
-    if (channels[0].empty()) return {particles.position, particles.radius, frame.peak, {}, {}, particles.id};
-    return {particles.position, particles.radius, channels[0], channels[1], channels[2], particles.id};
+    std::span<const std::uint64_t> id;
+    if (frame.sampleById) id = particles.id;
+    if (channels[0].empty()) return {particles.position, particles.radius, frame.peak, {}, {}, id};
+    return {particles.position, particles.radius, channels[0], channels[1], channels[2], id};
   }
 };
 
@@ -71,11 +75,9 @@ DensityRules densityRules(const Scene& scene) {
 
 /// The scale on Density that gives lines through the particles the mean optical depth that the scene asks for: of all
 /// particles at their own size, as they are drawn, whatever share of them casts shadows.
-double calibratedScale(const Frame& frame, double wanted, const std::string& place) {
-  const DensityArrays arrays(frame);
-  const DensityTree all(arrays.input(), {});
+double calibratedScale(const Octree& all, const Frame& frame, double wanted, const std::string& place) {
   const vec3& uniform = frame.rules.extinction;
-  const double mean = meanLineOpticalDepth(all.tree(), frame.rules.falloff) * (uniform.x + uniform.y + uniform.z) / 3;
+  const double mean = meanLineOpticalDepth(all, frame.rules.falloff) * (uniform.x + uniform.y + uniform.z) / 3;
   if (!(mean > 0))
     throw InputError(place, "/medium/optical_depth", "particles with some density to calibrate",
                      "a mean optical depth of 0", "is the channel Density, or medium.extinction, zero everywhere?");
@@ -89,13 +91,40 @@ void scale(std::vector<float>& peaks, double factor) {
   });
 }
 
-/// Density scale and sub-sampling that the scene leaves open, from its first frame.
-void settleDensity(Scene& scene, Frame& frame) {
+/// Whether the channel ID can choose the particles that cast shadows; says so where it cannot.
+bool idsServe(const Scene& scene, const ParticleSet& particles) {
+  const bool sampled = scene.lighting.autoSubsample || scene.lighting.subsample < 1;
+  if (!sampled || particles.id.empty()) return true;
+  const double share = meanIdShare(particles.id);
+  if (share <= kMostIdShare) return true;
+  logWarning(
+      fmt::format("ID is no name of a particle: {:.0f} of them share one in the mean; lighting.subsample goes by "
+                  "the index instead, which is steady only where the order of the particles is",
+                  share));
+  return false;
+}
+
+bool castsAsDrawn(const Scene& scene, const Frame& frame) {
+  const LightingSettings& lighting = scene.lighting;
+  return !lighting.autoSubsample && lighting.subsample >= 1 && lighting.radiusScale == 1 &&
+         frame.extinction.factor.empty();
+}
+
+/// Density scale and sub-sampling that the scene leaves open, from its first frame; `stats` gets what is measured.
+void settleDensity(Scene& scene, Frame& frame, FrameStats& stats) {
   if (scene.medium.opticalDepth) {
-    const double density = calibratedScale(frame, *scene.medium.opticalDepth, scene.path);
+    const DensityArrays arrays(frame);
+    // Where all particles cast shadows at their own size this tree is also the frame's; only its densities change.
+    const bool keep = castsAsDrawn(scene, frame);
+    DensityTree all(arrays.input(), keep ? densityRules(scene) : DensityRules{});
+    const double density = calibratedScale(all.tree(), frame, *scene.medium.opticalDepth, scene.path);
     logVerbose(fmt::format("optical_depth {} is density_scale {}", *scene.medium.opticalDepth, density));
     scene.medium.densityScale = static_cast<float>(density);
     scene.medium.opticalDepth.reset();
+    if (keep) {
+      all.scaleDensity(scene.medium.densityScale);
+      frame.density = std::move(all);
+    }
   }
   scale(frame.peak, scene.medium.densityScale);
   if (!scene.lighting.autoSubsample) return;
@@ -106,7 +135,15 @@ void settleDensity(Scene& scene, Frame& frame) {
                          choice.error, scene.lighting.error));
   scene.lighting.subsample = choice.fraction;
   scene.lighting.autoSubsample = false;
-  scene.lighting.subsampleError = choice.error;
+  stats.subsampleError = choice.error;
+  if (choice.fraction < 1) scene.lighting.error = 0;  // the sample has spent it: its light is exact
+}
+
+/// True where this frame is one of many: of this run, or of a sequence that other runs do the rest of.
+bool isAnimated(const Scene& scene) {
+  if (scene.frames.first != scene.frames.last) return true;
+  return std::any_of(scene.particles.begin(), scene.particles.end(),
+                     [](const ParticleSource& source) { return source.file.find('#') != std::string::npos; });
 }
 
 void prepareMedium(const Scene& scene, Frame& frame) {
@@ -126,12 +163,20 @@ Viewer viewerOf(const layout::SplatCamera& camera) {
   return {.eye = camera.position, .parallel = camera.orthographic != 0, .toCamera = -camera.forward};
 }
 
-/// Meshes of the frame and the tree of those that cast shadows; adds their files to `files`.
-void prepareSolids(const Scene& scene, Frame& frame, std::vector<std::string>& files) {
+/// Everything that comes from files: particles, meshes and, for a picture, sprites.
+void load(const Scene& scene, FramePurpose purpose, Frame& frame, FrameStats& stats) {
+  std::vector<std::string> files;
+  frame.particles = loadParticles(scene.particles, frame.number, scene.medium.densityMode, &files);
   for (const Solid& solid : scene.solids) {
     frame.meshes.push_back(loadMesh(solid, frame.number));
     files.push_back(framePath(solid.file, frame.number));
   }
+  if (purpose == FramePurpose::Picture) frame.blank = readSprites(scene, files);
+  stats.inputs = hashInputs(files);
+}
+
+/// The tree of the meshes that cast shadows.
+void prepareSolids(const Scene& scene, Frame& frame) {
   frame.solidTree = buildSolidTree(shadowTriangles(scene.solids, frame.meshes));
   frame.solidLight = 1 - scene.lighting.solidShadowIntensity;
 }
@@ -159,25 +204,27 @@ layout::uint endpointCode(Endpoint endpoint) {
   return endpoint == Endpoint::Clamp ? layout::kEndpointClamp : layout::kEndpointSoft;
 }
 
-Frame prepareFrame(Scene& scene, int number, FrameStats& stats) {
+Frame prepareFrame(Scene& scene, int number, FrameStats& stats, FramePurpose purpose) {
   Frame frame;
   frame.number = stats.frame = number;
   Timer timer;
-  std::vector<std::string> files;
-  frame.particles = loadParticles(scene.particles, number, scene.medium.densityMode, &files);
+  load(scene, purpose, frame, stats);
   stats.seconds["load"] = timer.lap();
+
+  prepareSolids(scene, frame);
+  if (!scene.solids.empty()) stats.seconds["solids"] = timer.lap();
 
   fitDefaults(scene, frame.particles.supportBounds());
   for (const LightSource& light : scene.lights) {
     frame.lights.push_back(toLight(light));
     frame.lightNames.push_back(light.name);
   }
-  prepareSolids(scene, frame, files);
-  stats.inputs = hashInputs(files);
   prepareMedium(scene, frame);
-  settleDensity(scene, frame);
-  frame.density = DensityTree(DensityArrays(frame).input(), densityRules(scene));
-  frame.blank = blankSplats(scene, number, frame.rules.falloff);
+  frame.sampleById = idsServe(scene, frame.particles);
+  settleDensity(scene, frame, stats);
+  frame.error = {scene.lighting.error, isAnimated(scene)};
+  if (frame.density.source().empty()) frame.density = DensityTree(DensityArrays(frame).input(), densityRules(scene));
+  setCameras(scene, number, frame.rules.falloff, frame.blank);
   frame.view = frame.blank.camera();
   frame.scattering = {phaseOf(scene.medium.phase), viewerOf(frame.view)};
 
@@ -185,7 +232,10 @@ Frame prepareFrame(Scene& scene, int number, FrameStats& stats) {
   stats.particles = frame.particles.size();
   stats.inOctree = frame.density.tree().particleCount();
   stats.subsample = scene.lighting.subsample;
-  stats.subsampleError = scene.lighting.subsampleError;
+  if (stats.subsample >= 1) stats.subsampleError = 0;
+  if (stats.inOctree == 0 && stats.particles > 0)
+    logWarning(fmt::format("lighting.subsample {:g} leaves none of the {} particles in the octree: none casts a shadow",
+                           stats.subsample, stats.particles));
   stats.lights = frame.lights.size();
   stats.radius = radiusRange(frame.particles);
   stats.seconds["octree"] = timer.lap();

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/stats.h"
+#include "host/lighting/approximate.h"
 #include "host/lighting/density_tree.h"
 #include "host/lighting/lighting.h"
 #include "host/lighting/medium.h"
@@ -24,19 +25,25 @@ struct Frame {
   std::vector<layout::Light> lights;
   std::vector<std::string> lightNames;
   LightingOptions rules;  ///< falloff, endpoint, cutoff, extinction where it is uniform
+  ErrorWanted error;      ///< what lights may be off
   Scattering scattering;
   std::vector<Mesh> meshes;  ///< of scene.solids, in their order
   SolidTree solidTree;       ///< of the triangles that cast shadows
   float solidLight = 0;      ///< share of the light that passes a solid: 1 − solid_shadow_intensity
   layout::SplatCamera view;  ///< the camera as the splats take it
   SplatSet blank;            ///< … at every moment that counts, and sprites; no particles
+  bool sampleById = true;    ///< false: too many particles share their ID, the index says which of them cast shadows
 };
 
-/// Loads and builds; fills `stats` (counts, radius, density scale, inputs, seconds of load and octree).
+/// What a frame is made for: the light alone needs no sprites.
+enum class FramePurpose { Picture, Light };
+
+/// Loads and builds; fills `stats` (counts, radius, density scale, inputs; seconds of load, of octree with calibration
+/// and "auto" sub-sampling, and of solids for their tree).
 /// What the scene leaves open (a fitted camera, the default light, a density calibrated by optical depth) is settled by
 /// the first frame that is prepared and written into `scene`, so that a sequence neither jitters nor flickers.
 /// Throws InputError as readers and loaders do.
-Frame prepareFrame(Scene& scene, int number, FrameStats& stats);
+Frame prepareFrame(Scene& scene, int number, FrameStats& stats, FramePurpose purpose = FramePurpose::Picture);
 
 /// Shader codes of the scene's choices.
 layout::uint falloffCode(Falloff falloff);

@@ -19,7 +19,8 @@ struct ShadowSources {
   OpticalDepthSource opticalDepths;
   OcclusionSource occluded;
 };
-ShadowSources hostShadows(const Frame& frame);
+/// On the host, within the frame's error. How each light was computed is added to `methods` where it is given.
+ShadowSources hostShadows(const Frame& frame, std::vector<LightMethod>* methods = nullptr);
 
 /// T · S of one light at any receivers, [channel][receiver] (one channel or three): the medium's transmittance times
 /// the share that solids let pass. What the light does not reach (outside a spot's cone) has 1. No ray goes through the

@@ -5,6 +5,7 @@
 #include "engine/splats.h"
 #include "engine/surface_light.h"
 #include "host/core/parallel.h"
+#include "host/core/timer.h"
 #include "host/splat/full_footprint.h"
 
 namespace mote {
@@ -24,8 +25,8 @@ using SurfaceRadiance = std::vector<vec3>;
 
 class Composer {
  public:
-  Composer(const Scene& scene, const SplatSet& set, const Surfaces& surfaces, Rasterizer& rasterizer)
-      : scene_(scene), set_(set), surfaces_(surfaces), rasterizer_(rasterizer) {
+  Composer(const Scene& scene, const SplatSet& set, const Surfaces& surfaces, Rasterizer& rasterizer, FrameStats& stats)
+      : scene_(scene), set_(set), surfaces_(surfaces), rasterizer_(rasterizer), stats_(stats) {
     if (!surfaces.empty())
       for (int k = 0; k < surfaces.drawings(); ++k) depths_.push_back(surfaces.depths(k));
   }
@@ -36,10 +37,12 @@ class Composer {
     Image sum;
     for (std::size_t k = 0; k < depths_.size(); ++k) {
       const Image drawn = rasterizer_.draw(depths_[k], layers);
+      Timer timer;
       if (k == 0) sum = empty(drawn);
       parallelBlocks(drawn.pixels.size(), kBlock, [&](std::size_t begin, std::size_t end) {
         for (std::size_t p = begin; p < end; ++p) add(drawn, static_cast<int>(k), p, radiance, sum);
       });
+      stats_.seconds["solids"] += timer.lap();
     }
     for (std::size_t p = 0; p < sum.velocity.size(); ++p)
       if (sum.pixels[p].w > 0) sum.velocity[p] /= sum.pixels[p].w;
@@ -79,6 +82,7 @@ class Composer {
   const SplatSet& set_;
   const Surfaces& surfaces_;
   Rasterizer& rasterizer_;
+  FrameStats& stats_;
   std::vector<std::vector<float>> depths_;
 };
 
@@ -105,12 +109,13 @@ ImageLayer shadowLayer(const std::string& light, const Surfaces& surfaces, const
 }  // namespace
 
 Image makePicture(const Frame& frame, const Scene& scene, const SplatSet& set, LitParticles lit,
-                  const Surfaces& surfaces, Rasterizer& rasterizer, const ShadowSources& sources) {
+                  const Surfaces& surfaces, Rasterizer& rasterizer, const ShadowSources& sources, FrameStats& stats) {
   std::vector<ImageLayer> shadows;
   std::vector<SurfaceRadiance> byLight;
   SurfaceRadiance total(surfaces.all.size(), vec3(0));
   const std::size_t pixels =
       static_cast<std::size_t>(scene.output.size.x) * static_cast<std::size_t>(scene.output.size.y);
+  Timer timer;
   for (std::size_t l = 0; l < frame.lights.size(); ++l) {
     SurfaceLight own;
     if (!surfaces.empty()) own = lightSurfaces(frame, scene, surfaces, frame.lights[l], sources);
@@ -118,7 +123,8 @@ Image makePicture(const Frame& frame, const Scene& scene, const SplatSet& set, L
     if (scene.output.shadow) shadows.push_back(shadowLayer(frame.lightNames[l], surfaces, own.shadow, pixels));
     byLight.push_back(std::move(own.radiance));
   }
-  Composer composer(scene, set, surfaces, rasterizer);
+  if (!surfaces.empty()) stats.seconds["lighting"] += timer.lap();
+  Composer composer(scene, set, surfaces, rasterizer, stats);
   Image picture = composer.compose(total, layersOf(frame, scene.output));
   picture.layers = std::move(shadows);
   if (!scene.output.lights) return picture;

@@ -19,8 +19,9 @@ namespace mote {
 ///   shadow.<light>   T · S at the surfaces, weighted by coverage; 1 where there is none. Holdouts have it as well
 ///   light.<name>.*   the picture by one light alone; `emission.*` what the particles give out. Their sum is the
 ///   picture
-/// `lit` is taken apart on the way. `sources` serve the surfaces; `seconds` get "solids".
+/// `lit` is taken apart on the way. `sources` light the surfaces. The seconds of that go to stats' "lighting", those of
+/// laying surfaces and medium over each other to "solids"; the rasteriser counts its own.
 Image makePicture(const Frame& frame, const Scene& scene, const SplatSet& set, LitParticles lit,
-                  const Surfaces& surfaces, Rasterizer& rasterizer, const ShadowSources& sources);
+                  const Surfaces& surfaces, Rasterizer& rasterizer, const ShadowSources& sources, FrameStats& stats);
 
 }  // namespace mote

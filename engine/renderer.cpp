@@ -96,7 +96,7 @@ LitParticles Renderer::light(const Frame& frame, LightWanted wanted, FrameStats&
     lit = lightParticles(frame, device.sources(frame), wanted);
     device.addTo(stats);
   } else {
-    lit = lightParticles(frame, hostShadows(frame), wanted);
+    lit = lightParticles(frame, hostShadows(frame, frame.error.mean > 0 ? &stats.methods : nullptr), wanted);
   }
   stats.seconds["lighting"] += timer.lap();
   return lit;
@@ -109,9 +109,12 @@ Image Renderer::draw(const Frame& frame, const Scene& scene, LitParticles lit, F
   const bool seen = std::any_of(scene.solids.begin(), scene.solids.end(),
                                 [](const Solid& solid) { return solid.mode != SolidMode::Hidden; });
   if (seen) surfaces = traceSurfaces(scene.solids, frame.meshes, frame.view);
-  std::optional<DeviceShadows> device;
-  if (!surfaces.empty() && backends_.gpuLighting) device.emplace(gpu_->device(), frame);
   if (seen) stats.seconds["solids"] += timer.lap();
+  std::optional<DeviceShadows> device;
+  if (!surfaces.empty() && backends_.gpuLighting) {
+    device.emplace(gpu_->device(), frame);
+    stats.seconds["lighting"] += timer.lap();
+  }
 
   SplatSet set = splatSet(frame, scene, lit.radiance);
   lit.radiance = {};
@@ -121,7 +124,7 @@ Image Renderer::draw(const Frame& frame, const Scene& scene, LitParticles lit, F
                                                      : hostRasterizer(set, keyScale, stats);
   if (order) *order = rasterizer->order();
   Image image = makePicture(frame, scene, set, std::move(lit), surfaces, *rasterizer,
-                            device ? device->sources(frame) : hostShadows(frame));
+                            device ? device->sources(frame) : hostShadows(frame), stats);
   if (device) device->addTo(stats);
   return image;
 }

@@ -31,8 +31,8 @@ class Renderer {
   LitParticles light(const Frame& frame, LightWanted wanted, FrameStats& stats);
 
   /// Sorts, splats, and lays solids and medium over each other, with the layers of scene.output (picture.h); adds
-  /// seconds and deviceSeconds of solids, sort and splat. `lit` as lightWanted(scene) asks. `order`, if given, gets the
-  /// sorted slots.
+  /// seconds and deviceSeconds of solids (camera rays, compositing), lighting (of the solids), sort and splat. `lit` as
+  /// lightWanted(scene) asks. `order`, if given, gets the sorted slots.
   Image draw(const Frame& frame, const Scene& scene, LitParticles lit, FrameStats& stats,
              std::vector<layout::uint>* order = nullptr);
 

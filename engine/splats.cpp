@@ -1,6 +1,8 @@
 #include "engine/splats.h"
 
 #include <algorithm>
+#include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 
@@ -29,31 +31,34 @@ layout::SplatCamera cameraAtFrame(const Scene& scene, double frame, layout::uint
   return result;
 }
 
-Image readSprite(const Scene& scene, const char* key, const std::string& path, PngValues values) {
+std::string lowerCase(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+/// `least`: of R, G and B; an EXR holds any number.
+void checkNumbers(const std::string& path, const Image& map, float least) {
+  for (std::size_t i = 0; i < map.pixels.size(); ++i) {
+    const vec4& p = map.pixels[i];
+    const bool finite = std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) && std::isfinite(p.w);
+    if (finite && std::min({p.x, p.y, p.z}) >= least) continue;
+    const std::size_t width = static_cast<std::size_t>(map.width);
+    throw InputError(path, fmt::format("pixel {}, {}", i % width, i / width),
+                     std::isfinite(least) ? "finite colours ≥ 0" : "finite numbers",
+                     fmt::format("{}, {}, {}, alpha {}", p.x, p.y, p.z, p.w));
+  }
+}
+
+Image readSprite(const Scene& scene, const char* key, const std::string& path, PngValues values,
+                 std::vector<std::string>& files) {
   if (!std::filesystem::exists(path))
     throw InputError(scene.path, fmt::format("/view/{}", key), "a PNG or EXR picture",
                      fmt::format("{}, which does not exist", path), nearestNames(path, path));
-  return std::filesystem::path(path).extension() == ".exr" ? readExr(path) : readPng(path, values);
-}
-
-void readSprites(const Scene& scene, SplatSet& set) {
-  const View& view = scene.view;
-  if (!view.spriteColor.empty()) {
-    Image map = readSprite(scene, "sprite_color", view.spriteColor, PngValues::Color);
-    set.scene.spriteColorWidth = static_cast<layout::uint>(map.width);
-    set.scene.spriteColorHeight = static_cast<layout::uint>(map.height);
-    set.spriteColor = std::move(map.pixels);
-  }
-  if (!view.spriteOpacity.empty()) {
-    const Image map = readSprite(scene, "sprite_opacity", view.spriteOpacity, PngValues::Data);
-    set.scene.spriteOpacityWidth = static_cast<layout::uint>(map.width);
-    set.scene.spriteOpacityHeight = static_cast<layout::uint>(map.height);
-    const bool hasAlpha = std::any_of(map.pixels.begin(), map.pixels.end(), [](const vec4& p) { return p.w < 1; });
-    for (const vec4& p : map.pixels) {
-      const float value = hasAlpha ? p.w : (p.x + p.y + p.z) / 3;
-      set.spriteOpacity.push_back(value > 0 ? std::min(value, 1.0f) : 0.0f);
-    }
-  }
+  const bool exr = lowerCase(std::filesystem::path(path).extension().string()) == ".exr";
+  Image map = exr ? readExr(path) : readPng(path, values);
+  checkNumbers(path, map, values == PngValues::Color ? 0 : -std::numeric_limits<float>::infinity());
+  files.push_back(path);
+  return map;
 }
 
 /// A cross-section spread over a disc s times as wide is 1/s² of it in the middle; in mode peak the peak stays.
@@ -80,8 +85,27 @@ std::vector<vec3> inReceiverOrder(const Frame& frame, const Get& get) {
 
 }  // namespace
 
-SplatSet blankSplats(const Scene& scene, int number, layout::uint falloff) {
+SplatSet readSprites(const Scene& scene, std::vector<std::string>& files) {
+  const View& view = scene.view;
   SplatSet set;
+  if (!view.spriteColor.empty()) {
+    Image map = readSprite(scene, "sprite_color", view.spriteColor, PngValues::Color, files);
+    set.scene.spriteColorWidth = static_cast<layout::uint>(map.width);
+    set.scene.spriteColorHeight = static_cast<layout::uint>(map.height);
+    set.spriteColor = std::move(map.pixels);
+  }
+  if (!view.spriteOpacity.empty()) {
+    const Image map = readSprite(scene, "sprite_opacity", view.spriteOpacity, PngValues::Data, files);
+    set.scene.spriteOpacityWidth = static_cast<layout::uint>(map.width);
+    set.scene.spriteOpacityHeight = static_cast<layout::uint>(map.height);
+    const bool hasAlpha = std::any_of(map.pixels.begin(), map.pixels.end(), [](const vec4& p) { return p.w < 1; });
+    for (const vec4& p : map.pixels)
+      set.spriteOpacity.push_back(std::clamp(hasAlpha ? p.w : (p.x + p.y + p.z) / 3, 0.0f, 1.0f));
+  }
+  return set;
+}
+
+void setCameras(const Scene& scene, int number, layout::uint falloff, SplatSet& set) {
   layout::SplatScene& s = set.scene;
   const Camera& camera = scene.camera;
   const double fps = scene.frames.fps;
@@ -92,8 +116,6 @@ SplatSet blankSplats(const Scene& scene, int number, layout::uint falloff) {
   s.close = cameraAtFrame(scene, number + camera.shutter.y * fps, falloff);
   s.before = cameraAtFrame(scene, number - 0.5, falloff);
   s.after = cameraAtFrame(scene, number + 0.5, falloff);
-  readSprites(scene, set);
-  return set;
 }
 
 SplatSet splatSet(const Frame& frame, const Scene& scene, const std::vector<vec3>& inScattered) {

@@ -1,5 +1,6 @@
 // From a frame to what the rasterisers draw: cameras of every moment, sprites, particles with their light.
 #pragma once
+#include <string>
 #include <vector>
 
 #include "engine/frame.h"
@@ -7,9 +8,13 @@
 
 namespace mote {
 
-/// Cameras, times and sprites of a frame, without particles. Throws InputError where the camera has no view at a moment
-/// that counts (the shutter's ends, half a frame before and after) and for sprites that cannot be read.
-SplatSet blankSplats(const Scene& scene, int number, layout::uint falloff);
+/// The scene's sprites, without particles and cameras; adds their files to `files`. Throws InputError for sprites that
+/// cannot be read, numbers that are not finite, and negative colours.
+SplatSet readSprites(const Scene& scene, std::vector<std::string>& files);
+
+/// Cameras and times of a frame. Throws InputError where the camera has no view at a moment that counts: the shutter's
+/// ends, half a frame before and after.
+void setCameras(const Scene& scene, int number, layout::uint falloff, SplatSet& set);
 
 /// What is drawn, in the order of the receivers: radiance is albedo · Color · in-scattered radiance.
 SplatSet splatSet(const Frame& frame, const Scene& scene, const std::vector<vec3>& inScattered);

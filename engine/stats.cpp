@@ -10,18 +10,39 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+Json toJson(const LightMethod& method) {
+  const Approximation& how = method.how;
+  Json json = {{"light", method.light}, {"method", how.grid ? "light_grid" : "exact"}, {"allowed", how.allowed}};
+  if (how.grid) {
+    json["cell"] = how.resolution.cell;
+    json["bin"] = how.resolution.bin;
+    json["cell_radii"] = how.cellRadii;
+  }
+  json["mean"] = how.mean;
+  json["upper"] = how.upper;
+  json["p99"] = how.p99;
+  json["max"] = how.greatest;
+  json["probes"] = how.probes;
+  return json;
+}
+
 Json reproducible(const FrameStats& frame) {
+  Json methods = Json::array();
+  for (const LightMethod& method : frame.methods) methods.push_back(toJson(method));
   Json inputs = Json::array();
   for (const FrameInput& input : frame.inputs) inputs.push_back({{"file", input.file}, {"sha256", input.sha256}});
-  return {{"frame", frame.frame},
-          {"particles", frame.particles},
-          {"in_octree", frame.inOctree},
-          {"lights", frame.lights},
-          {"density_scale", frame.densityScale},
-          {"subsample", {{"fraction", frame.subsample}, {"error", frame.subsampleError}}},
-          {"radius", {{"min", frame.radius.min}, {"mean", frame.radius.mean}, {"max", frame.radius.max}}},
-          {"inputs", std::move(inputs)},
-          {"warnings", frame.warnings}};
+  return {
+      {"frame", frame.frame},
+      {"particles", frame.particles},
+      {"in_octree", frame.inOctree},
+      {"lights", frame.lights},
+      {"density_scale", frame.densityScale},
+      {"subsample",
+       {{"fraction", frame.subsample}, {"error", frame.subsampleError ? Json(*frame.subsampleError) : Json(nullptr)}}},
+      {"light_error", std::move(methods)},
+      {"radius", {{"min", frame.radius.min}, {"mean", frame.radius.mean}, {"max", frame.radius.max}}},
+      {"inputs", std::move(inputs)},
+      {"warnings", frame.warnings}};
 }
 
 Json rounded(const std::map<std::string, double>& seconds) {

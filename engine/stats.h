@@ -2,9 +2,11 @@
 #pragma once
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "host/lighting/approximate.h"
 #include "host/particles/particle_set.h"
 
 namespace mote {
@@ -13,16 +15,26 @@ struct FrameInput {
   std::string file, sha256;
 };
 
+/// How one light's shadows in the medium were computed.
+struct LightMethod {
+  std::string light;
+  Approximation how;
+};
+
 struct FrameStats {
   int frame = 1;
   std::size_t particles = 0, inOctree = 0, lights = 0;
-  std::map<std::string, double> seconds;        ///< wall clock: load, octree, lighting, sort, splat, write, total
+  /// Wall clock: load (particles, meshes, sprites, their sums), octree (with calibration and "auto" sub-sampling),
+  /// lighting (of particles and surfaces), sort, splat, write, total; solids (tree, camera rays, compositing) where
+  /// there are any.
+  std::map<std::string, double> seconds;
   std::map<std::string, double> deviceSeconds;  ///< the GPU's own clock (timestamps): lighting, sort, splat
   std::uint64_t deviceBytes = 0;                ///< most device memory held at once by one stage
   double densityScale = 1;
-  double subsample = 1;       ///< share of the particles in the octree …
-  double subsampleError = 0;  ///< … and its mean |ΔT| where "auto" measured it
+  double subsample = 1;                  ///< share of the particles in the octree …
+  std::optional<double> subsampleError;  ///< … and its mean |ΔT|: 0 for all, else empty unless measured on this frame
   RadiusRange radius;
+  std::vector<LightMethod> methods;  ///< of the particles' light; empty where nothing but exact sums was allowed
   std::vector<FrameInput> inputs;
   std::vector<std::string> warnings;
 };

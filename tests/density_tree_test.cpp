@@ -60,10 +60,35 @@ TEST(DensityTree, SampleIsAShareThatGoesByIdAndNests) {
   std::reverse(cloud.set.position.begin(), cloud.set.position.end());
   EXPECT_EQ(idsInTree(cloud, DensityTree(cloud.input(), {.fraction = 0.5f, .seed = 3})), ids);
   EXPECT_NE(idsInTree(cloud, DensityTree(cloud.input(), {.fraction = 0.5f, .seed = 4})), ids);
-  // Without ids the index decides.
+}
+
+TEST(DensityTree, WithoutIdsTheIndexDecides) {
+  Cloud cloud(5000);
+  const auto indices = [&] {
+    const DensityTree density(cloud.input(), {.fraction = 0.5f, .seed = 3});
+    return std::set<std::uint32_t>(density.tree().source.begin(), density.tree().source.end());
+  };
+  const auto chosenBy = [&](const auto& key) {
+    std::set<std::uint32_t> chosen;
+    for (std::uint32_t i = 0; i < 5000; ++i)
+      if (isSampled(key(i), 3, 0.5f)) chosen.insert(i);
+    return chosen;
+  };
+  for (std::uint32_t i = 0; i < 5000; ++i) cloud.set.id[i] = 1'000'000 + 7 * i;
+  const std::set<std::uint32_t> byId = indices();
+  EXPECT_EQ(byId, chosenBy([](std::uint32_t i) { return 1'000'000 + 7 * i; }));
   cloud.set.id.clear();
-  EXPECT_EQ(DensityTree(cloud.input(), {.fraction = 0.5f, .seed = 3}).tree().particleCount(),
-            DensityTree(cloud.input(), {.fraction = 0.5f, .seed = 3}).tree().particleCount());
+  EXPECT_EQ(indices(), chosenBy([](std::uint32_t i) { return i; }));
+  EXPECT_NE(indices(), byId);
+}
+
+TEST(DensityTree, MeanIdShareIsOneWhereEveryIdIsAnothersAndTheCountWhereAllAreOne) {
+  using Ids = std::vector<std::uint64_t>;
+  EXPECT_EQ(meanIdShare(Ids{}), 0);
+  EXPECT_EQ(meanIdShare(Ids{7, 3, 9, 0}), 1);
+  EXPECT_EQ(meanIdShare(Ids{7, 7, 7, 7}), 4);
+  EXPECT_EQ(meanIdShare(Ids{1, 2, 3, 1, 2, 3}), 2);  // two sources that count from 1
+  EXPECT_EQ(meanIdShare(Ids{5, 0, 5, 5}), 2.5);      // (3 · 3 + 1 · 1) / 4
 }
 
 TEST(DensityTree, EveryParticleIsLitAndLeavesItselfOut) {

@@ -478,6 +478,55 @@ TEST(Png, ReadsDataAsItStandsAndAlphaApart) {
   EXPECT_EQ(read.pixels[1], vec4(1, 0, 1, 0)) << "not premultiplied: a pixel of no opacity keeps its colour";
 }
 
+/// A grey or RGB file of one row, its numbers as they are; `gamma` 0: no gAMA chunk.
+void writeRawPng(const std::string& path, int bits, int colorType, std::vector<std::uint8_t> row, double gamma) {
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);  // aborts on an error
+  png_infop info = png_create_info_struct(png);
+  std::FILE* file = std::fopen(path.c_str(), "wb");
+  ASSERT_NE(file, nullptr);
+  png_init_io(png, file);
+  const std::size_t pixelBytes = static_cast<std::size_t>(bits / 8) * (colorType == PNG_COLOR_TYPE_RGB ? 3 : 1);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(row.size() / pixelBytes), 1, bits, colorType, PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  if (gamma > 0) png_set_gAMA(png, info, gamma);
+  png_write_info(png, info);
+  png_write_row(png, row.data());
+  png_write_end(png, nullptr);
+  png_destroy_write_struct(&png, &info);
+  std::fclose(file);
+}
+
+TEST(Png, TakesDataAsItStandsWhateverItsBitsAndGamma) {
+  const TempFolder folder;
+  for (const double gamma : {0.0, 1.0, 0.45455}) {
+    // 0.2 and 0.8 of 255 and of 65535 (0x3333, 0xcccc), and a number that 8 bits do not hold.
+    writeRawPng(folder.file("8.png"), 8, PNG_COLOR_TYPE_GRAY, {51, 204}, gamma);
+    writeRawPng(folder.file("16.png"), 16, PNG_COLOR_TYPE_GRAY, {0x33, 0x33, 0xcc, 0xcc, 0x12, 0x34}, gamma);
+    const Image eight = readPng(folder.file("8.png"), PngValues::Data);
+    const Image sixteen = readPng(folder.file("16.png"), PngValues::Data);
+    ASSERT_EQ(sixteen.pixels.size(), 3u);
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_FLOAT_EQ(eight.pixels[0][c], 0.2f) << gamma;
+      EXPECT_FLOAT_EQ(eight.pixels[1][c], 0.8f) << gamma;
+      EXPECT_FLOAT_EQ(sixteen.pixels[0][c], 0.2f) << gamma;
+      EXPECT_FLOAT_EQ(sixteen.pixels[1][c], 0.8f) << gamma;
+      EXPECT_FLOAT_EQ(sixteen.pixels[2][c], 0x1234 / 65535.0f) << gamma;
+    }
+    EXPECT_EQ(sixteen.pixels[0].w, 1);
+  }
+}
+
+TEST(Png, TakesColoursOf16BitsAsSrgb) {
+  const TempFolder folder;
+  writeRawPng(folder.file("8.png"), 8, PNG_COLOR_TYPE_RGB, {188, 51, 255}, 0);
+  writeRawPng(folder.file("16.png"), 16, PNG_COLOR_TYPE_RGB, {188, 188, 51, 51, 255, 255}, 0);
+  const Image eight = readPng(folder.file("8.png"), PngValues::Color);
+  const Image sixteen = readPng(folder.file("16.png"), PngValues::Color);
+  ASSERT_EQ(sixteen.pixels.size(), 1u);
+  EXPECT_NEAR(sixteen.pixels[0].x, 0.5029, 1e-4);  // IEC 61966-2-1 of 188/255
+  for (int c = 0; c < 3; ++c) EXPECT_FLOAT_EQ(sixteen.pixels[0][c], eight.pixels[0][c]);
+}
+
 TEST(Png, RefusesWhatIsNoWholePicture) {
   const TempFolder folder;
   EXPECT_THROW(readPng(folder.file("gone.png"), PngValues::Data), InputError);
@@ -614,7 +663,7 @@ TEST(Compare, NotFinitePixelsAreCountedAndLeftOut) {
 
 TEST(Compare, LayersAreHeldAgainstEachOtherByName) {
   Image a = layered(4, 1), b = layered(4, 1);
-  EXPECT_TRUE(compareImages(a, b).onlyInOne.empty());
+  EXPECT_TRUE(failuresOf(compareImages(a, b)).empty());
   for (const LayerDifference& layer : compareImages(a, b).layers) {
     EXPECT_EQ(layer.channel.max, 0) << layer.name;
     EXPECT_EQ(layer.within, 1) << layer.name;
@@ -624,7 +673,8 @@ TEST(Compare, LayersAreHeldAgainstEachOtherByName) {
   b.layers[1].name = "shadow.rim";
   b.opticalDepth[2] += 0.25f;
   const ImageDifference d = compareImages(a, b);
-  EXPECT_EQ(d.onlyInOne, (std::vector<std::string>{"shadow.key", "shadow.rim"}));
+  EXPECT_EQ(d.onlyInFirst, std::vector<std::string>{"shadow.key"});
+  EXPECT_EQ(d.onlyInSecond, std::vector<std::string>{"shadow.rim"});
   const auto layer = [&](const std::string& name) {
     for (const LayerDifference& l : d.layers)
       if (l.name == name) return l;
@@ -637,6 +687,46 @@ TEST(Compare, LayersAreHeldAgainstEachOtherByName) {
   EXPECT_NEAR(layer("optical_depth").channel.max, 0.25, 1e-6);
   EXPECT_EQ(layer("optical_depth").channel.maxX, 2);
   EXPECT_SAYS(differenceJson(d), "\"optical_depth\"");
+}
+
+TEST(Compare, SmallNumbersOfALayerAreHeldToItsOwnScale) {
+  Image a = layered(4, 1), b = layered(4, 1);
+  for (Image* image : {&a, &b}) image->opticalDepth = {0, 0.02f, 0.05f, 0.01f};
+  const auto opticalDepth = [&] {
+    for (const LayerDifference& l : compareImages(a, b).layers)
+      if (l.name == "optical_depth") return l;
+    return LayerDifference{};
+  };
+  EXPECT_NEAR(opticalDepth().scale, 0.05, 1e-8);
+  EXPECT_NEAR(opticalDepth().level, 0.02, 1e-8);
+  b.opticalDepth[3] += 0.0003f;  // 2/255 of 0.05 is 0.00039
+  EXPECT_EQ(opticalDepth().within, 1);
+  b.opticalDepth[3] += 0.0002f;
+  EXPECT_EQ(opticalDepth().within, 0.75);
+  a.opticalDepth = {0, 0, 0, 0}, b.opticalDepth = {0, 0, 0, 7e-5f};  // 2/255 of the least scale, 0.01, is 7.8e-5
+  EXPECT_EQ(opticalDepth().within, 1);
+}
+
+TEST(Compare, FailuresNameTheLayerAndWhatIsWrongWithIt) {
+  const Image a = layered(4, 1);
+  const auto failures = [&](const Image& b) { return failuresOf(compareImages(a, b)); };
+  EXPECT_TRUE(failures(a).empty());
+  Image far = a, endless = a, less = a;
+  far.opticalDepth[0] += 1;
+  endless.opticalDepth[1] = kNan;
+  less.opticalDepth.clear();
+  ASSERT_EQ(failures(far).size(), 1u);
+  EXPECT_SAYS(failures(far)[0], "optical_depth: 75.0000 % of the pixels are within 2/255");
+  ASSERT_EQ(failures(endless).size(), 2u);
+  EXPECT_SAYS(failures(endless)[1], "optical_depth: 1 pixels are not finite");
+  ASSERT_EQ(failures(less).size(), 1u);
+  EXPECT_SAYS(failures(less)[0], "only the first picture has optical_depth");
+  ASSERT_EQ(failuresOf(compareImages(less, a)).size(), 1u);
+  EXPECT_SAYS(failuresOf(compareImages(less, a))[0], "only the second picture has optical_depth");
+  // The same infinity in both is no agreement.
+  Image infinite = a;
+  infinite.opticalDepth[2] = kInfinity;
+  EXPECT_EQ(failuresOf(compareImages(infinite, infinite)).size(), 2u);
 }
 
 TEST(Compare, DifferentSizesAreRefusedWithBoth) {

@@ -1,9 +1,12 @@
 // Whole pictures on the host: solids before, in and behind the medium, their light and shadows, every layer.
 #include "engine/picture.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
+#include <set>
 
 #include "engine/renderer.h"
 #include "host/particles/generate.h"
@@ -159,6 +162,32 @@ TEST_F(Picture, HoldoutsCutTheMediumAndHaveNoAlpha) {
   EXPECT_EQ(before.depth[centre], kNoDepth);
 }
 
+TEST_F(Picture, HoldoutsAndShadedSolidsOfOnePixelStayApartHoweverManyThereAre) {
+  one({0, 0, 0}, 1, 0);
+  // Five strips side by side, each a solid of its own and deeper than the one before; the picture is one pixel.
+  const float edges[] = {-1, -0.25f, 0.25f, 0.5f, 0.75f, 1};
+  for (int strip = 0; strip < 5; ++strip)
+    writeBytes(folder.file(fmt::format("strip{}.obj", strip)),
+               fmt::format("v {0} -2 {2}\nv {1} -2 {2}\nv {1} 2 {2}\nv {0} 2 {2}\nf 1 2 3 4\n", edges[strip],
+                           edges[strip + 1], -strip));
+  // Which strips are holdouts; A is what the others cover.
+  for (const std::set<int>& holdouts : {std::set<int>{3}, {0}, {1, 3}, {0, 1, 2, 3}, {}}) {
+    std::string solids;
+    double expected = 0;
+    for (int strip = 0; strip < 5; ++strip) {
+      const bool holdout = holdouts.contains(strip);
+      if (!holdout) expected += (edges[strip + 1] - edges[strip]) / 2;
+      solids += fmt::format(R"({}{{"name": "s{}", "file": "strip{}.obj", "mode": "{}"}})", strip > 0 ? ", " : "", strip,
+                            strip, holdout ? "holdout" : "shaded");
+    }
+    const Image image =
+        render(R"("camera": {"type": "orthographic", "position": [0, 0, 4], "target": [0, 0, 0], "height": 2},)" +
+               std::string(kSun) + kPeak + R"("solids": [)" + solids + R"(], "output": {"size": [1, 1]})");
+    EXPECT_NEAR(image.at(0, 0).w, expected, 1e-6) << holdouts.size();  // edges are whole 64ths of the pixel
+    EXPECT_NEAR(image.at(0, 0).x, expected * 0.5 * 3 / kPi, 1e-5) << holdouts.size();  // Lambert, albedo 0.5
+  }
+}
+
 TEST_F(Picture, EdgesAgainstTheMediumMixBothSidesByCoverageWithoutAHalo) {
   one({0, 0, -1}, 40, 6);  // fog, the same all over the picture
   const std::string rest = std::string(kCamera) + kSun + kPeak;
@@ -305,6 +334,34 @@ TEST_F(Picture, LightLayersOfAPlainSceneSumToTheBeautyToo) {
   EXPECT_EQ(image.alpha.size(), image.pixels.size());
   EXPECT_EQ(image.velocity.size(), image.pixels.size());
   EXPECT_EQ(image.opticalDepth.size(), image.pixels.size());
+}
+
+TEST_F(Picture, LightingCastsOneRayAParticleAndLight) {
+  writeBall(folder.file("particles.prt"));
+  for (const double share : {1.0, 0.2})
+    for (const int lights : {0, 1, 2, 5}) {
+      std::string list;
+      for (int l = 0; l < lights; ++l)
+        list += fmt::format(R"({}{{"name": "l{}", "position": [{}, 2, 2]}})", l > 0 ? ", " : "", l, l);
+      writeBytes(folder.file("scene.json"), fmt::format(R"({{"particles": [{{"file": "particles.prt"}}], "lights": [{}],
+                                 "lighting": {{"subsample": {}}}}})",
+                                                        list, share));
+      Scene scene = readScene(folder.file("scene.json"));
+      FrameStats stats;
+      frame = prepareFrame(scene, 1, stats);
+      std::atomic<std::size_t> rays{0};
+      ShadowSources sources = hostShadows(frame);
+      const OpticalDepthSource host = sources.opticalDepths;
+      sources.opticalDepths = [&](const Receivers& receivers, const layout::Light& light,
+                                  std::span<const std::uint8_t> reached, const RaysDone& done) {
+        return host(receivers, light, reached, [&](std::size_t count) {
+          rays += count;
+          done(count);
+        });
+      };
+      lightParticles(frame, sources, {});
+      EXPECT_EQ(rays, static_cast<std::size_t>(lights) * 3000) << share;
+    }
 }
 
 TEST_F(Picture, SolidsMoveOnThePictureWithTheCamera) {

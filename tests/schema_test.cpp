@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <limits>
@@ -409,12 +410,18 @@ TEST(SceneSchema, DescribesEveryKey) {
 }
 
 TEST(SceneSchema, AcceptsTheScenesOfTheRepository) {
-  for (const char* name : {"plume", "cloud", "ball"}) {
-    const std::string path = std::string(MOTE_SOURCE_DIR "/scenes/") + name + ".json";
-    std::ifstream file(path);
-    EXPECT_TRUE(accepts(schema(), json::parse(file, nullptr, true, true))) << path;
-    EXPECT_NO_THROW(readScene(path)) << path;
-  }
+  std::set<std::string> names;
+  for (const char* folder : {MOTE_SOURCE_DIR "/scenes", MOTE_SOURCE_DIR "/scenes/gallery"})
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+      const std::filesystem::path& path = entry.path();
+      if (path.extension() != ".json" || path.filename() == "scene.schema.json") continue;
+      names.insert(path.stem());
+      std::ifstream file(path);
+      EXPECT_TRUE(accepts(schema(), json::parse(file, nullptr, true, true))) << path;
+      EXPECT_NO_THROW(readScene(path)) << path;
+    }
+  for (const char* name : {"plume", "cloud", "ball", "lens", "louvre", "ground", "smoke1"})
+    EXPECT_TRUE(names.contains(name)) << name;
 }
 
 }  // namespace

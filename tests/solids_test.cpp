@@ -1,4 +1,5 @@
 // Meshes as they come from files, the tree over them, and shadow rays: no leak, and what brute force says.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -78,6 +79,45 @@ TEST(Mesh, MakesNormalsThatKeepSharpEdges) {
     const vec3 face =
         glm::normalize(glm::cross(cube.position[b] - cube.position[a], cube.position[c] - cube.position[a]));
     for (const std::uint32_t corner : {a, b, c}) EXPECT_LE(glm::length(cube.normal[corner] - face), 1e-5f);
+  }
+}
+
+TEST(Mesh, ReadsBinaryAndAsciiStl) {
+  // A tetrahedron with its right angle at the origin; its normals are for the reader to make or to take.
+  const vec3 corners[] = {{0, 0, 0}, {2, 0, 0}, {0, 3, 0}, {0, 0, 4}};
+  const std::array<int, 3> faces[] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  std::string ascii = "solid tetrahedron\n", binary(80, ' ');
+  const auto put = [&](const auto& value) { binary.append(reinterpret_cast<const char*>(&value), sizeof value); };
+  put(std::uint32_t{4});
+  for (const auto& [a, b, c] : faces) {
+    const vec3 normal = glm::normalize(glm::cross(corners[b] - corners[a], corners[c] - corners[a]));
+    ascii += fmt::format("  facet normal {} {} {}\n    outer loop\n", normal.x, normal.y, normal.z);
+    put(normal);
+    for (const int k : {a, b, c}) {
+      ascii += fmt::format("      vertex {} {} {}\n", corners[k].x, corners[k].y, corners[k].z);
+      put(corners[k]);
+    }
+    ascii += "    endloop\n  endfacet\n";
+    put(std::uint16_t{0});
+  }
+  ascii += "endsolid tetrahedron\n";
+  ASSERT_EQ(binary.size(), 84u + 4 * 50);
+  const test::TempFolder folder;
+  test::writeBytes(folder.file("ascii.stl"), ascii);
+  test::writeBytes(folder.file("binary.stl"), binary);
+  for (const char* name : {"ascii.stl", "binary.stl"}) {
+    const Mesh mesh = loadMesh(solidOf(folder.file(name)), 1);
+    ASSERT_EQ(mesh.triangles.size(), 4u) << name;
+    expectBounds(mesh, {0, 0, 0}, {2, 3, 4}, 0);
+    double volume = 0;  // 2 · 3 · 4 / 6, counted with the side that each triangle shows
+    for (std::size_t k = 0; k < 4; ++k) {
+      const layout::Triangle t = mesh.triangle(k);
+      volume += glm::dot(dvec3(t.a), glm::cross(dvec3(t.b), dvec3(t.c))) / 6;
+      const vec3 face = glm::normalize(glm::cross(t.b - t.a, t.c - t.a));
+      for (const std::uint32_t corner : mesh.triangles[k])
+        EXPECT_LE(glm::length(mesh.normal[corner] - face), 1e-5f) << name << " " << k;
+    }
+    EXPECT_NEAR(volume, 4, 1e-6) << name;
   }
 }
 

@@ -17,25 +17,8 @@ namespace {
 /// The limits by default are those that crosscheck holds CPU and GPU pictures to.
 struct CompareOptions {
   std::string first, second, report, diff;
-  double maxRmse = 1e-3, minWithin = 0.999;
+  CompareLimits limits;
 };
-
-/// Why the pictures count as different; empty where they do not.
-std::vector<std::string> failures(const ImageDifference& d, const CompareOptions& options) {
-  std::vector<std::string> found;
-  if (!(d.overall.rmse <= options.maxRmse))
-    found.push_back(fmt::format("RMSE {:.3g} exceeds {:g}", d.overall.rmse, options.maxRmse));
-  if (!(d.within >= options.minWithin))
-    found.push_back(fmt::format("{:.4f} % of the pixels are within 2/255, less than {:g} %", 100 * d.within,
-                                100 * options.minWithin));
-  for (const LayerDifference& layer : d.layers)
-    if (!(layer.within >= options.minWithin))
-      found.push_back(fmt::format("{}: {:.4f} % of the pixels are within 2/255, less than {:g} %", layer.name,
-                                  100 * layer.within, 100 * options.minWithin));
-  if (d.overall.notFinite > 0)
-    found.push_back(fmt::format("{} pixels are not finite and so cannot be compared", d.overall.notFinite));
-  return found;
-}
 
 void printDifference(const ImageDifference& d) {
   fmt::print("{} × {} pixels\n", d.width, d.height);
@@ -50,7 +33,6 @@ void printDifference(const ImageDifference& d) {
     row(layer.name, layer.channel);
     if (layer.unmatched > 0) fmt::print("{:<8}{} pixels have it in one picture only\n", "", layer.unmatched);
   }
-  for (const std::string& name : d.onlyInOne) fmt::print("only one picture has the channel {}\n", name);
   fmt::print("PSNR {}, within 2/255: {:.4f} % of the pixels\n",
              std::isfinite(d.psnr) ? fmt::format("{:.1f} dB", d.psnr) : "infinite (no difference)", 100 * d.within);
 }
@@ -59,16 +41,16 @@ std::string reportJson(const ImageDifference& difference, const CompareOptions& 
                        const std::vector<std::string>& failed) {
   nlohmann::ordered_json json = nlohmann::ordered_json::parse(differenceJson(difference));
   json["first"] = options.first, json["second"] = options.second;
-  json["limits"] = {{"rmse", options.maxRmse}, {"within", options.minWithin}};
+  json["limits"] = {{"rmse", options.limits.rmse}, {"within", options.limits.within}};
   json["failures"] = failed;
   json["passed"] = failed.empty();
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 void checkLimits(const CompareOptions& options) {
-  if (!(options.maxRmse >= 0)) throw InputError("--max-rmse", "", "a number ≥ 0", fmt::format("{}", options.maxRmse));
-  if (!(options.minWithin >= 0 && options.minWithin <= 1))
-    throw InputError("--within", "", "a share from 0 to 1", fmt::format("{}", options.minWithin));
+  const auto [rmse, within] = options.limits;
+  if (!(rmse >= 0)) throw InputError("--max-rmse", "", "a number ≥ 0", fmt::format("{}", rmse));
+  if (!(within >= 0 && within <= 1)) throw InputError("--within", "", "a share from 0 to 1", fmt::format("{}", within));
 }
 
 /// Returns whether the pictures are as alike as they must be.
@@ -81,7 +63,7 @@ bool compare(const CompareOptions& options) {
     throw InputError(options.second, "size", fmt::format("{} × {} as {}", first.width, first.height, options.first),
                      fmt::format("{} × {}", second.width, second.height));
   const ImageDifference difference = compareImages(first, second);
-  const std::vector<std::string> failed = failures(difference, options);
+  const std::vector<std::string> failed = failuresOf(difference, options.limits);
   if (!options.diff.empty()) writeDifferencePng(options.diff, first, second);
   if (!options.report.empty()) writeWholeFile(options.report, reportJson(difference, options, failed));
   printDifference(difference);
@@ -93,17 +75,18 @@ bool compare(const CompareOptions& options) {
 
 void addCompareCommand(CLI::App& app, const CommonOptions&, int& exitCode) {
   auto options = std::make_shared<CompareOptions>();
-  CLI::App* command =
-      app.add_subcommand("compare", "Measure how far two pictures are apart; exit 1 where it is too far");
+  CLI::App* command = app.add_subcommand(
+      "compare", "Measure how far two pictures and their layers are apart; exit 1 where it is too far");
   command->add_option("first", options->first, "OpenEXR picture")->required()->type_name("A.exr");
   command->add_option("second", options->second, "OpenEXR picture of the same size")->required()->type_name("B.exr");
   command->add_option("--report", options->report, "Write the differences as JSON")->type_name("OUT.json");
   command->add_option("--diff", options->diff, "Write 64 × the difference as a picture")->type_name("OUT.png");
-  command->add_option("--max-rmse", options->maxRmse, "Greatest RMSE that passes; 1e-3, crosscheck's, by default")
+  command->add_option("--max-rmse", options->limits.rmse, "Greatest RMSE that passes; 1e-3, crosscheck's, by default")
       ->type_name("X");
   command
-      ->add_option("--within", options->minWithin,
-                   "Least share of pixels that differ by at most 2/255; 0.999, crosscheck's, by default")
+      ->add_option("--within", options->limits.within,
+                   "Least share of pixels, in the picture and in each layer, that differ by at most 2/255; 0.999, "
+                   "crosscheck's, by default")
       ->type_name("SHARE");
   command->callback([options, &exitCode] { exitCode = compare(*options) ? 0 : 1; });
 }

@@ -93,7 +93,7 @@ for entry in "${gallery[@]}"; do
   printf '%s %.1f\n' "$name" "$(echo "$(date +%s.%N) $from" | awk '{print $1 - $2}')" >>"$seconds_file"
   sheet+=(-label "${caption//%/%%}" "$out/$name.png")
 done
-montage -background '#202020' -fill '#dddddd' -pointsize 11 -tile 4x -geometry 320x180+6+6 "${sheet[@]}" "$out/sheet.png"
+montage -font DejaVu-Sans -background '#202020' -fill '#dddddd' -pointsize 11 -tile 4x -geometry 320x180+6+6 "${sheet[@]}" "$out/sheet.png"
 printf 'gallery: %s, seconds a picture in %s\n' "$out/sheet.png" "$seconds_file"
 
 if [[ $docs -eq 1 ]]; then

@@ -14,6 +14,7 @@
 #include "host/scene/frame_path.h"
 #include "host/scene/missing_file.h"
 #include "host/scene/scene_reader.h"
+#include "host/solids/surfaces.h"
 #include "shaders/glsl/layout/node.h"
 #include "shaders/glsl/layout/sort.h"
 #include "shaders/glsl/layout/splat.h"
@@ -77,34 +78,97 @@ SourceFacts factsOf(const ParticleSource& source, int frame) {
           .id = true};
 }
 
-/// Bytes that the stages of one frame hold at their peak: what grows with the particles or the picture, and the program
-/// itself. Within a fifth of the peaks measured on the host for 10⁵ to 4·10⁶ particles; the plume's generator (200 MB
-/// for its flow) and a driver come on top.
+/// Bytes that one frame holds at its peak: what grows with the particles or the picture, and the program itself. A test
+/// holds the host's against renders.
 struct MemoryNeed {
   double host = 0, device = 0;
 };
 
-MemoryNeed memoryNeed(double particles, const std::vector<SourceFacts>& sources, const Scene& scene) {
-  // Particles a cell × nodes a particle: between 2 and 7, by how the particles fall into the cells; measured for the
-  // three generators, 10⁴ to 10⁶ particles, 8 to 128 a cell.
-  const double perCell =
-      scene.lighting.particlesPerCell > 0 ? scene.lighting.particlesPerCell : kDefaultParticlesPerCell;
-  const double nodes = std::min(2.0, 4 / perCell) * sizeof(layout::Node);
-  const auto any = [&](bool SourceFacts::*has) {
-    return std::any_of(sources.begin(), sources.end(), [&](const SourceFacts& s) { return s.*has; });
-  };
-  const double set = 12 + 4 + 4 + 12 * any(&SourceFacts::color) + 12 * any(&SourceFacts::absorption) +
-                     12 * any(&SourceFacts::emission) + 12 * any(&SourceFacts::velocity) + 8 * any(&SourceFacts::id);
-  constexpr double kTree = 6 * 4;                               // x, y, z, radius, peak, source
-  constexpr double kDraw = sizeof(layout::SplatParticle) + 12;  // with radiance, or with (key, index) and order
-  constexpr double kLightDevice = 16 + 4 + 4 + 4;               // position and radius, peak, order, optical depth
-  constexpr double kDrawDevice = sizeof(layout::SplatParticle) + sizeof(layout::SortPair) + 4;
-  const double depth = scene.output.depth ? 4 : 0;
-  const double pixels = double(scene.output.size.x) * scene.output.size.y;
+/// What of a scene decides about its memory.
+struct MemoryFacts {
+  double particles, pixels, lights;
+  double share;      ///< of the particles in the octree; "auto" may take all
+  double cellNodes;  ///< bytes of nodes a particle in the tree
+  bool color, absorption, emission, velocity, id;
+  bool moving;       ///< velocities are drawn
+  bool rgb, solids;  ///< extinction that is not grey; solids that are seen
+
+  MemoryFacts(double count, const std::vector<SourceFacts>& sources, const Scene& scene) {
+    const auto any = [&](bool SourceFacts::*has) {
+      return std::any_of(sources.begin(), sources.end(), [&](const SourceFacts& s) { return s.*has; });
+    };
+    particles = count;
+    pixels = double(scene.output.size.x) * scene.output.size.y;
+    lights = scene.defaultLights ? 1 : static_cast<double>(scene.lights.size());
+    share = scene.lighting.autoSubsample ? 1 : scene.lighting.subsample;
+    // Particles a cell × nodes a particle: between 2 and 7, by how the particles fall into the cells; measured for the
+    // three generators, 10⁴ to 10⁶ particles, 8 to 128 a cell.
+    const double perCell =
+        scene.lighting.particlesPerCell > 0 ? scene.lighting.particlesPerCell : kDefaultParticlesPerCell;
+    cellNodes = std::min(2.0, 4 / perCell) * sizeof(layout::Node);
+    color = any(&SourceFacts::color), absorption = any(&SourceFacts::absorption);
+    emission = any(&SourceFacts::emission), velocity = any(&SourceFacts::velocity), id = any(&SourceFacts::id);
+    moving = velocity && (scene.output.velocity || scene.camera.shutter.x != scene.camera.shutter.y);
+    const vec3& e = scene.medium.extinction;
+    rgb = absorption || e.x != e.y || e.y != e.z;
+    solids = std::any_of(scene.solids.begin(), scene.solids.end(),
+                         [](const Solid& solid) { return solid.mode != SolidMode::Hidden; });
+  }
+  /// Receivers of their own beside those in the tree.
+  bool sampled() const { return share < 1; }
+  /// The splat of a particle with what full splats have: colours, emission, velocity.
+  double splat() const { return sizeof(layout::SplatParticle) + 12.0 * (rgb + emission + moving); }
+};
+
+/// Bytes a particle on the host while the picture is drawn, which is when most is held.
+double particleBytes(const MemoryFacts& f, const Output& output) {
+  const double set = 12 + 4 + 4 + 4 + 12.0 * (f.color + f.absorption + f.emission + f.velocity) + 8.0 * f.id;
+  const double tree = f.share * (6 * 4 + 8 * f.absorption + f.cellNodes) + (f.sampled() ? 5 * 4 : 0);
+  const double sort = 8 + 4;                                  // (key, index) and order
+  const double splats = 2 * f.splat() + 12.0 * f.absorption;  // of the frame and of the rasteriser; factors of colours
+  const double byLight = output.lights ? 12 * f.lights + sizeof(layout::SplatParticle) : 0;  // and one light's splats
+  return set + tree + sort + splats + byLight;
+}
+
+/// Bytes a pixel of one drawing.
+double drawnBytes(const MemoryFacts& f, const Output& output) {
+  return 16 + 4.0 * output.depth + 4.0 * output.opticalDepth + 8.0 * output.velocity + 12.0 * f.rgb;
+}
+
+/// Bytes a pixel on the host, as if surfaces were all over the picture: while it is drawn, or while they are gathered.
+double pixelBytes(const MemoryFacts& f, const Output& output) {
+  const double lightLayers = output.lights ? f.lights + f.emission : 0;
+  const double layers = 4 * (output.shadow ? f.lights : 0) + 12 * lightLayers;
+  const double one = lightLayers > 0 ? 16 + 12.0 * (f.rgb && f.solids) : 0;  // the picture by one light
+  const double drawn = drawnBytes(f, output) + layers + one;
+  if (!f.solids) return drawn + (output.precision == Precision::Half ? 2 * (4 + 3.0 * f.rgb + 3 * lightLayers) : 0);
+  const double surfaces = sizeof(Surface) + 4 + 12 + 16 * f.lights;  // and where a pixel's begin, and their light
+  // Two drawings at once, and four depths for the rasteriser; what is written as half comes when all that is gone.
+  return std::max(2.0 * sizeof(Surface) + 4, drawn + drawnBytes(f, output) + one + 4 * 4 + surfaces);
+}
+
+MemoryNeed memoryNeed(const MemoryFacts& f, const Scene& scene) {
   constexpr double kProgram = 20e6;  // code, libraries, threads
-  const double half = scene.output.precision == Precision::Half ? 8 : 0;
-  return {.host = kProgram + particles * (set + kTree + nodes + kDraw) + pixels * (16 + depth + half),
-          .device = std::max(particles * (nodes + kLightDevice), particles * kDrawDevice + pixels * (16 + depth))};
+  const double channels = f.absorption ? 3 : 1;
+  const double lighting = f.share * (f.cellNodes + 16 + 4 * channels) + 4 + 4 * channels +  // tree, order, result
+                          (f.sampled() ? 16 + 4 : 0);
+  const double drawing = f.splat() + sizeof(layout::SortPair) + 4;
+  const bool layers = scene.output.depth || scene.output.opticalDepth || scene.output.velocity || f.rgb;
+  return {.host = kProgram + f.particles * particleBytes(f, scene.output) + f.pixels * pixelBytes(f, scene.output),
+          .device = std::max(f.particles * lighting,
+                             f.particles * drawing + f.pixels * ((layers ? 40 : 16) + 4.0 * f.solids))};
+}
+
+/// What takes memory and stands in no header.
+Json notCounted(const Scene& scene) {
+  Json list = Json::array();
+  if (!scene.solids.empty()) list.push_back("the solids' meshes and their tree");
+  if (!scene.view.spriteColor.empty() || !scene.view.spriteOpacity.empty()) list.push_back("sprites");
+  if (std::any_of(scene.particles.begin(), scene.particles.end(),
+                  [](const ParticleSource& source) { return source.generate == Generator::Plume; }))
+    list.push_back("the plume generator's flow, 200 MB");
+  list.push_back("a Vulkan driver's own");
+  return list;
 }
 
 /// 1 µs a ray on two cores for a million particles (host/lighting/lighting.h); a ray meets the more, the more there are
@@ -203,13 +267,13 @@ std::string approximationsText(const Json& lighting) {
   const Json& share = lighting["subsample"];
   const char* total = lighting["compensate"] == true ? "that stand for all" : "alone";
   if (share.is_string()) {
-    parts.push_back(fmt::format("the smallest share of the particles within the error in the octree, {}", total));
+    parts.push_back(fmt::format("the smallest share of the particles with a mean |ΔT| <= {:g} in the octree, {}",
+                                lighting["error"].get<double>(), total));
   } else if (share != 1.0) {
     parts.push_back(fmt::format("{:g} % of the particles in the octree, {}", 100 * share.get<double>(), total));
   }
   if (lighting["radius_scale"] != 1.0)
     parts.push_back(fmt::format("radii × {:g}", lighting["radius_scale"].get<double>()));
-  if (lighting["error"] != 0.0) parts.push_back(fmt::format("mean |ΔT| <= {:g}", lighting["error"].get<double>()));
   return fmt::format("{}", fmt::join(parts, "; "));
 }
 
@@ -231,7 +295,7 @@ Json describeScene(const std::string& path) {
   const auto shadows =
       std::count_if(lights.begin(), lights.end(), [](const Json& l) { return l["casts_shadows"] == true; });
   const double count = static_cast<double>(particles), rays = count * static_cast<double>(shadows);
-  const MemoryNeed need = memoryNeed(count, facts, scene);
+  const MemoryNeed need = memoryNeed(MemoryFacts(count, facts, scene), scene);
   return {{"file", path},
           {"kind", "scene"},
           {"particles", particles},
@@ -246,6 +310,7 @@ Json describeScene(const std::string& path) {
           {"estimate",
            {{"host_bytes", std::round(need.host)},
             {"device_bytes", std::round(need.device)},
+            {"not_counted", notCounted(scene)},
             {"rays", rays},
             {"threads", threadCount()},
             {"lighting_seconds", rays * raySeconds(count)}}}};
@@ -271,8 +336,10 @@ void printScene(const Json& info) {
                              info["output"].get<std::string>()));
   row("frames", fmt::format("{} to {}, every {}", frames["first"].get<int>(), frames["last"].get<int>(),
                             frames["step"].get<int>()));
-  row("memory", fmt::format("about {}; on a Vulkan device about {}", bytesText(estimate["host_bytes"].get<double>()),
-                            bytesText(estimate["device_bytes"].get<double>())));
+  row("memory",
+      fmt::format("about {}; on a Vulkan device about {}; without {}", bytesText(estimate["host_bytes"].get<double>()),
+                  bytesText(estimate["device_bytes"].get<double>()),
+                  fmt::join(estimate["not_counted"].get<std::vector<std::string>>(), ", ")));
   row("work", fmt::format("{:.0f} rays a frame, about {:.2g} s with {} threads", estimate["rays"].get<double>(),
                           estimate["lighting_seconds"].get<double>(), estimate["threads"].get<unsigned>()));
 }

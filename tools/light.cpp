@@ -61,7 +61,7 @@ void light(const LightOptions& options, const CommonOptions& common) {
                                            Backend::Cpu, deviceOptions(common), gpu);
   Renderer renderer(backends, gpu.get());
   FrameStats stats;
-  const Frame frame = prepareFrame(scene, number, stats);
+  const Frame frame = prepareFrame(scene, number, stats, FramePurpose::Light);
   const LitParticles lit = renderer.light(frame, {.transmittance = true}, stats);
   requireNoValidationMessages(gpu.get());
   writeLit(path, frame, lit);

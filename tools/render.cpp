@@ -55,6 +55,15 @@ void checkOutputs(const RenderOptions& options, const Scene& scene) {
   if (!options.stats.empty()) OutputFile probe(options.stats);
 }
 
+/// The stages in the order of the work, those that there were.
+std::string stageSeconds(const FrameStats& stats) {
+  std::string text;
+  for (const char* stage : {"load", "octree", "lighting", "sort", "splat", "solids", "write"})
+    if (const auto found = stats.seconds.find(stage); found != stats.seconds.end())
+      text += fmt::format("{}{} {:.1f}", text.empty() ? "" : ", ", stage, found->second);
+  return text;
+}
+
 void renderFrame(Scene& scene, int number, const RenderOptions& options, Renderer& renderer, RunStats& run) {
   FrameStats stats;
   Timer total;
@@ -68,11 +77,8 @@ void renderFrame(Scene& scene, int number, const RenderOptions& options, Rendere
     writePng(framePath(options.preview, number), image, parseExposure(options.exposure).value_or(autoExposure(image)));
   stats.seconds["write"] = write.seconds();
   stats.seconds["total"] = total.seconds();
-  logInfo(fmt::format(
-      "frame {}: {} particles, {} lights, {:.1f} s (load {:.1f}, octree {:.1f}, lighting {:.1f}, sort "
-      "{:.1f}, splat {:.1f}, write {:.1f}) -> {}",
-      number, stats.particles, stats.lights, stats.seconds["total"], stats.seconds["load"], stats.seconds["octree"],
-      stats.seconds["lighting"], stats.seconds["sort"], stats.seconds["splat"], stats.seconds["write"], path));
+  logInfo(fmt::format("frame {}: {} particles, {} lights, {:.1f} s ({}) -> {}", number, stats.particles, stats.lights,
+                      stats.seconds["total"], stageSeconds(stats), path));
   run.frames.push_back(std::move(stats));
 }
 

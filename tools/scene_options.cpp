@@ -49,6 +49,12 @@ void writeFrameExr(const std::string& path, const Image& image, const Frame& fra
   options.frame = frame.number;
   options.pixelAspectRatio = scene.output.pixelAspect;
   options.strings = {{"mote:version", MOTE_VERSION}, {"mote:stats", reproducibleStatsJson(run, stats)}};
+  if (!image.depth.empty())  // others write the distance from the camera, or that to the first of all samples
+    options.strings["mote:Z"] = fmt::format(
+        "distance along the view axis [scene units] to the nearest particle centre whose splat has an alpha >= 0.001, "
+        "or "
+        "to the nearest shaded surface; {:g} where there is neither",
+        kNoDepth);
   writeExr(path, image, options);
 }
 

@@ -9,7 +9,7 @@ packages=(
   glslang-tools spirv-tools
   libglm-dev libtbb-dev libopenexr-dev libpng-dev zlib1g-dev libssl-dev
   libassimp-dev libembree-dev libcli11-dev nlohmann-json3-dev libfmt-dev libhwy-dev libgtest-dev
-  imagemagick
+  imagemagick fonts-dejavu-core
 )
 
 # One line a package that dpkg knows, "g++ ii "; those it does not know are missing as well.

@@ -33,26 +33,43 @@ struct Sums {
   }
 };
 
+/// Greatest finite number of either channel, by its size.
+double greatest(const ChannelView& a, const ChannelView& b, std::size_t pixels) {
+  double result = 0;
+  for (const ChannelView* view : {&a, &b})
+    for (std::size_t i = 0; i < pixels; ++i) {
+      const float value = view->at(i);
+      if (std::isfinite(value) && (view->empty == 0 || value != view->empty))
+        result = std::max(result, std::fabs(double(value)));
+    }
+  return result;
+}
+
 LayerDifference compareLayer(const ChannelView& a, const ChannelView& b, int width, std::size_t pixels) {
   LayerDifference layer{.name = a.name};
+  layer.scale = std::clamp(greatest(a, b, pixels), kLeastLayerScale, 1.0);
   Sums sums;
   std::size_t within = 0;
+  double level = 0;
+  std::size_t held = 0;
   for (std::size_t i = 0; i < pixels; ++i) {
     const float p = a.at(i), q = b.at(i);
     if (a.empty != 0 && (p == a.empty) != (q == a.empty)) {
       ++layer.unmatched;
       continue;
     }
-    const double difference = p == q ? 0 : std::fabs(double(p) - double(q));
+    const double difference = std::fabs(double(p) - double(q));  // ∞ and ∞ do not compare either
     if (!std::isfinite(difference)) {
       ++sums.result.notFinite;
       continue;
     }
     sums.add(difference, static_cast<int>(i % static_cast<std::size_t>(width)),
              static_cast<int>(i / static_cast<std::size_t>(width)));
-    within += difference <= kPixelTolerance * std::max(1.0, std::fabs(double(p)));
+    if (a.empty == 0 || p != a.empty) level += std::fabs(double(p)), ++held;
+    within += difference <= kPixelTolerance * std::max(layer.scale, std::fabs(double(p)));
   }
   layer.channel = sums.finish();
+  if (held > 0) layer.level = level / static_cast<double>(held);
   if (pixels > 0) layer.within = double(within) / double(pixels);
   return layer;
 }
@@ -65,12 +82,12 @@ void compareLayers(const Image& a, const Image& b, ImageDifference& out) {
   for (std::size_t c = 4; c < first.size(); ++c) {  // R G B A come first
     const auto twin = find(second, first[c].name);
     if (twin == second.end())
-      out.onlyInOne.push_back(first[c].name);
+      out.onlyInFirst.push_back(first[c].name);
     else
       out.layers.push_back(compareLayer(first[c], *twin, a.width, a.pixels.size()));
   }
   for (const ChannelView& view : second)
-    if (find(first, view.name) == first.end()) out.onlyInOne.push_back(view.name);
+    if (find(first, view.name) == first.end()) out.onlyInSecond.push_back(view.name);
 }
 
 nlohmann::json jsonOf(const ChannelDifference& c) {
@@ -111,6 +128,33 @@ ImageDifference compareImages(const Image& a, const Image& b) {
   return out;
 }
 
+std::vector<std::string> failuresOf(const LayerDifference& layer, const CompareLimits& limits) {
+  std::vector<std::string> found;
+  if (!(layer.within >= limits.within))
+    found.push_back(fmt::format("{}: {:.4f} % of the pixels are within 2/255 of {:.2g}, less than {:g} %", layer.name,
+                                100 * layer.within, layer.scale, 100 * limits.within));
+  if (layer.channel.notFinite > 0)
+    found.push_back(
+        fmt::format("{}: {} pixels are not finite and so cannot be compared", layer.name, layer.channel.notFinite));
+  return found;
+}
+
+std::vector<std::string> failuresOf(const ImageDifference& d, const CompareLimits& limits) {
+  std::vector<std::string> found;
+  if (!(d.overall.rmse <= limits.rmse))
+    found.push_back(fmt::format("RMSE {:.3g} exceeds {:g}", d.overall.rmse, limits.rmse));
+  if (!(d.within >= limits.within))
+    found.push_back(
+        fmt::format("{:.4f} % of the pixels are within 2/255, less than {:g} %", 100 * d.within, 100 * limits.within));
+  if (d.overall.notFinite > 0)
+    found.push_back(fmt::format("{} pixels are not finite and so cannot be compared", d.overall.notFinite));
+  for (const LayerDifference& layer : d.layers)
+    for (std::string& failure : failuresOf(layer, limits)) found.push_back(std::move(failure));
+  for (const std::string& name : d.onlyInFirst) found.push_back(fmt::format("only the first picture has {}", name));
+  for (const std::string& name : d.onlyInSecond) found.push_back(fmt::format("only the second picture has {}", name));
+  return found;
+}
+
 std::string differenceJson(const ImageDifference& d) {
   nlohmann::ordered_json json;
   json["width"] = d.width, json["height"] = d.height;
@@ -125,8 +169,10 @@ std::string differenceJson(const ImageDifference& d) {
     json["channels"][layer.name] = jsonOf(layer.channel);
     json["channels"][layer.name]["unmatched"] = layer.unmatched;
     json["channels"][layer.name]["within"] = layer.within;
+    json["channels"][layer.name]["scale"] = layer.scale;
+    json["channels"][layer.name]["level"] = layer.level;
   }
-  json["only_in_one"] = d.onlyInOne;
+  json["only_in_first"] = d.onlyInFirst, json["only_in_second"] = d.onlyInSecond;
   return json.dump(2) + "\n";
 }
 

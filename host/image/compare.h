@@ -27,8 +27,13 @@ struct LayerDifference {
   std::string name;
   ChannelDifference channel{};
   std::size_t unmatched = 0;
-  double within = 1;  ///< share of all pixels that match and differ by ≤ kPixelTolerance · max(1, |a|)
+  double scale = 1;   ///< greatest finite |a| or |b|, kept between kLeastLayerScale and 1
+  double level = 0;   ///< mean of |a| over the pixels that both have
+  double within = 1;  ///< share of all pixels that match and differ by ≤ kPixelTolerance · max(scale, |a|)
 };
+
+/// A layer whose numbers are all smaller is held to 2/255 of this: a hundredth of a pixel of motion, or of radiance 1.
+constexpr double kLeastLayerScale = 0.01;
 
 struct ImageDifference {
   int width = 0, height = 0;
@@ -36,14 +41,26 @@ struct ImageDifference {
   ChannelDifference overall;            ///< over all four channels' values; notFinite: pixels with any
   double within = 1;                    ///< share of all pixels whose R, G, B and A each differ by ≤ kPixelTolerance
   std::vector<LayerDifference> layers;  ///< in the first picture's order
-  std::vector<std::string> onlyInOne;   ///< names of channels that only one of the pictures has
-  double psnr = 0;                      ///< [dB] −20·log10(overall.rmse), peak value 1; +∞ for equal pictures
+  std::vector<std::string> onlyInFirst, onlyInSecond;  ///< names of channels that only one of the pictures has
+  double psnr = 0;  ///< [dB] −20·log10(overall.rmse), peak value 1; +∞ for equal pictures
 };
 
 /// Throws InputError when the sizes differ. About 0.01 s a million pixels and four channels.
 ImageDifference compareImages(const Image& a, const Image& b);
 
-/// The same as a JSON object; a PSNR of equal pictures is null there.
+/// How far apart pictures may be; the defaults are what `mote crosscheck` holds CPU and GPU to.
+struct CompareLimits {
+  double rmse = 1e-3;     ///< of R G B A together
+  double within = 0.999;  ///< least share of pixels within 2/255: of R G B A together, and of each layer by its scale
+};
+
+/// Why the pictures count as different, a sentence each: beyond the limits, pixels that are not finite, channels that
+/// only one of them has. Empty where they do not.
+std::vector<std::string> failuresOf(const ImageDifference& difference, const CompareLimits& limits = {});
+/// The same of one layer.
+std::vector<std::string> failuresOf(const LayerDifference& layer, const CompareLimits& limits = {});
+
+/// The differences as a JSON object; a PSNR of equal pictures is null there.
 std::string differenceJson(const ImageDifference& difference);
 
 /// A PNG of gain · |a − b|, clipped to [0, 1] and not sRGB-encoded; each colour channel shows the larger of its own and

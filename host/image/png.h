@@ -22,11 +22,12 @@ void writePngBytes(const std::string& path, const std::vector<std::uint8_t>& rgb
 /// What the numbers of a PNG mean.
 enum class PngValues {
   Color,  ///< sRGB: becomes linear
-  Data,   ///< a measure: value / 255 as it stands
+  Data,   ///< a measure: 0 to 1 as it stands
 };
 
-/// Any PNG, with 8 bits a channel: RGB as `values` says, not premultiplied; A 1 where there is none. Throws InputError
-/// for a file that is missing, is no PNG, or is larger than 16384 × 16384.
+/// Any PNG of up to 16 bits a channel: RGB as `values` says, whatever a gAMA or ICC chunk says; not premultiplied; A as
+/// it stands, 1 where there is none. Throws InputError for a file that is missing, is no PNG, or is larger than 16384 ×
+/// 16384.
 Image readPng(const std::string& path, PngValues values);
 
 }  // namespace mote

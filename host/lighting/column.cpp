@@ -35,25 +35,6 @@ void setPlane(ColumnPlanes& planes, int k, const dvec3& normal, double offset, f
   planes.offset[k] = static_cast<float>(std::min(offset / length + slack, double(kFarOff)));
 }
 
-/// The four sides and the farthest start; for a point light also the light itself.
-void setPlanes(ColumnPlanes& planes, const LightFrame& frame, const dvec2& lo, const dvec2& hi, double deepest,
-               float slack) {
-  clearPlanes(planes, vec3(frame.origin));
-  if (frame.perspective) {
-    setPlane(planes, 0, -frame.u + lo.x * frame.axis, 0, slack);
-    setPlane(planes, 1, frame.u - hi.x * frame.axis, 0, slack);
-    setPlane(planes, 2, -frame.v + lo.y * frame.axis, 0, slack);
-    setPlane(planes, 3, frame.v - hi.y * frame.axis, 0, slack);
-    setPlane(planes, 5, -frame.axis, 0, slack);
-  } else {
-    setPlane(planes, 0, -frame.u, -lo.x, slack);
-    setPlane(planes, 1, frame.u, hi.x, slack);
-    setPlane(planes, 2, -frame.v, -lo.y, slack);
-    setPlane(planes, 3, frame.v, hi.y, slack);
-  }
-  setPlane(planes, 4, frame.axis, deepest, slack);
-}
-
 void sortKeys(Column::Key* begin, Column::Key* end) {
   const auto before = [](const Column::Key& a, const Column::Key& b) {
     return a.reach != b.reach ? a.reach < b.reach : a.index < b.index;
@@ -99,6 +80,25 @@ ColumnRules columnRules(const Octree& tree, const layout::Light& light, const Bo
   return {2e-6f * extent, tree.leastRadius};
 }
 
+ColumnPlanes planesAround(const LightFrame& frame, const dvec2& lo, const dvec2& hi, double deepest, float slack) {
+  ColumnPlanes planes;
+  clearPlanes(planes, vec3(frame.origin));
+  if (frame.perspective) {
+    setPlane(planes, 0, -frame.u + lo.x * frame.axis, 0, slack);
+    setPlane(planes, 1, frame.u - hi.x * frame.axis, 0, slack);
+    setPlane(planes, 2, -frame.v + lo.y * frame.axis, 0, slack);
+    setPlane(planes, 3, frame.v - hi.y * frame.axis, 0, slack);
+    setPlane(planes, 5, -frame.axis, 0, slack);
+  } else {
+    setPlane(planes, 0, -frame.u, -lo.x, slack);
+    setPlane(planes, 1, frame.u, hi.x, slack);
+    setPlane(planes, 2, -frame.v, -lo.y, slack);
+    setPlane(planes, 3, frame.v, hi.y, slack);
+  }
+  setPlane(planes, 4, frame.axis, deepest, slack);
+  return planes;
+}
+
 LightFrame frameAbout(const dvec3& origin, const dvec3& axis, bool perspective) {
   LightFrame frame{perspective, origin, {}, {}, axis};
   frame.u = glm::normalize(glm::cross(axis, std::abs(axis.x) < 0.6 ? dvec3(1, 0, 0) : dvec3(0, 1, 0)));
@@ -138,7 +138,7 @@ void Column::setRays(const Receivers& receivers, const layout::Light& light, std
   const double across = std::max(hi.x - lo.x, hi.y - lo.y) * (perspective ? deepest : 1);
   precise = across > kPreciseRadii * rules.leastRadius;
   margin = rules.slack;
-  setPlanes(planes, frame, lo, hi, deepest, rules.slack);
+  planes = planesAround(frame, lo, hi, deepest, rules.slack);
 }
 
 void Column::setLine(const vec3& point, const vec3& direction, const ColumnRules& rules) {
@@ -146,7 +146,7 @@ void Column::setLine(const vec3& point, const vec3& direction, const ColumnRules
   depthBase = 0;
   margin = rules.slack;
   precise = false;
-  setPlanes(planes, frame, {0, 0}, {0, 0}, kInfinity, rules.slack);
+  planes = planesAround(frame, {0, 0}, {0, 0}, kInfinity, rules.slack);
 }
 
 void Column::sort(std::size_t channels) {

@@ -130,6 +130,9 @@ struct Column {
 /// The axis in the middle of the rays' box on their face of a cube around a point light (planBeams): at most 55° from
 /// any.
 dvec3 middleDirection(const dvec3& light, const Receivers& receivers, std::span<const std::uint32_t> members);
+/// Planes around the rays whose places in the frame lie between lo and hi and that start no deeper than `deepest` along
+/// the axis (for a point light, also: no farther away).
+ColumnPlanes planesAround(const LightFrame& frame, const dvec2& lo, const dvec2& hi, double deepest, float slack);
 /// A frame about an axis.
 LightFrame frameAbout(const dvec3& origin, const dvec3& axis, bool perspective);
 

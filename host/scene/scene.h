@@ -93,7 +93,6 @@ struct LightingSettings {
   std::uint32_t particlesPerCell = 0;  ///< 0: auto
   float subsample = 1;                 ///< share of the particles in the octree, 0 < share ≤ 1 (§4.6.3)
   bool autoSubsample = false;          ///< true: the smallest share whose mean |ΔT| is within `error`
-  double subsampleError = 0;           ///< mean |ΔT| measured for the share that "auto" took
   std::uint64_t subsampleSeed = 0;
   bool compensate = true;          ///< the octree's particles stand for all: the total cross-section stays
   float error = 0;                 ///< 0: exact; else the mean |ΔT| that approximations must keep; 0–1

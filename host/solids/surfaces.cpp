@@ -22,6 +22,7 @@ vec2 rayPlace(int k, int count) {
 
 struct Hit {
   std::uint32_t solid, triangle;
+  SolidMode mode;  ///< of the solid
   float depth;
   vec3 point, face, normal;  ///< geometric and shading normal, both toward the camera
   vec3 start;                ///< of shadow rays: the point, or above it where the smooth surface bulges
@@ -36,7 +37,11 @@ struct Group {
 class Tracer {
  public:
   Tracer(std::span<const Solid> solids, std::span<const Mesh> meshes, const layout::SplatCamera& camera)
-      : meshes_(meshes), camera_(camera), device_(embree::makeDevice()), scene_(rtcNewScene(device_.get())) {
+      : solids_(solids),
+        meshes_(meshes),
+        camera_(camera),
+        device_(embree::makeDevice()),
+        scene_(rtcNewScene(device_.get())) {
     rtcSetSceneFlags(scene_.get(), RTC_SCENE_FLAG_ROBUST);
     for (std::size_t k = 0; k < solids.size(); ++k) {
       if (solids[k].mode == SolidMode::Hidden) continue;
@@ -78,6 +83,7 @@ class Tracer {
     const auto [a, b, c] = mesh.triangles[ray.hit.primID];
     const float wb = ray.hit.u, wc = ray.hit.v, wa = 1 - wb - wc;
     result.solid = ray.hit.geomID, result.triangle = ray.hit.primID, result.depth = ray.ray.tfar;
+    result.mode = solids_[result.solid].mode;
     result.point = mesh.position[a] * wa + mesh.position[b] * wb + mesh.position[c] * wc;
     result.face = glm::normalize(vec3(glm::cross(dvec3(mesh.position[b]) - dvec3(mesh.position[a]),
                                                  dvec3(mesh.position[c]) - dvec3(mesh.position[a]))));
@@ -115,6 +121,7 @@ class Tracer {
   }
 
  private:
+  std::span<const Solid> solids_;
   std::span<const Mesh> meshes_;
   const layout::SplatCamera& camera_;
   embree::Device device_;
@@ -133,18 +140,34 @@ float meanDepth(const Group& group, const Hit* hits) {
   return sum / static_cast<float>(group.count);
 }
 
-/// The smallest groups join those nearest in depth until there is room for what is beside all surfaces.
+/// The group of the same mode that is nearest in depth; groups.end() if there is none. What is shown and what is only
+/// cut out must not become one.
+std::vector<Group>::iterator partnerOf(std::vector<Group>::iterator group, std::vector<Group>& groups,
+                                       const Hit* hits) {
+  const auto mode = [&](const Group& g) { return hits[g.hits[0]].mode; };
+  const float depth = meanDepth(*group, hits);
+  auto nearest = groups.end();
+  for (auto other = groups.begin(); other != groups.end(); ++other) {
+    if (other == group || mode(*other) != mode(*group)) continue;
+    const float distance = std::fabs(meanDepth(*other, hits) - depth);
+    if (nearest == groups.end() || distance < std::fabs(meanDepth(*nearest, hits) - depth)) nearest = other;
+  }
+  return nearest;
+}
+
+/// The smallest groups join others until there is room for what is beside all surfaces. Two modes are seen, so among
+/// more than three groups some two have the same.
 void mergeGroups(std::vector<Group>& groups, const Hit* hits) {
-  std::stable_sort(groups.begin(), groups.end(), [](const Group& a, const Group& b) { return a.count > b.count; });
+  const auto larger = [](const Group& a, const Group& b) { return a.count > b.count; };
+  std::stable_sort(groups.begin(), groups.end(), larger);
   while (groups.size() > kSurfaceClasses - 1) {
-    const Group smallest = groups.back();
-    groups.pop_back();
-    const float depth = meanDepth(smallest, hits);
-    Group* nearest = &groups[0];
-    for (Group& group : groups)
-      if (std::fabs(meanDepth(group, hits) - depth) < std::fabs(meanDepth(*nearest, hits) - depth)) nearest = &group;
-    for (int k = 0; k < smallest.count; ++k)
-      nearest->hits[static_cast<std::size_t>(nearest->count++)] = smallest.hits[static_cast<std::size_t>(k)];
+    auto smallest = groups.end() - 1;
+    auto partner = partnerOf(smallest, groups, hits);
+    while (partner == groups.end()) partner = partnerOf(--smallest, groups, hits);
+    for (int k = 0; k < smallest->count; ++k)
+      partner->hits[static_cast<std::size_t>(partner->count++)] = smallest->hits[static_cast<std::size_t>(k)];
+    groups.erase(smallest);
+    std::stable_sort(groups.begin(), groups.end(), larger);
   }
 }
 

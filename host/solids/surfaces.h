@@ -47,7 +47,7 @@ struct Surfaces {
 /// Casts the rays with Embree. meshes[k] is that of solids[k]; hidden ones are not seen. Surfaces are seen from near to
 /// far of the camera, sharp and at the frame's time whatever lens and shutter are. Rays of one pixel belong to one
 /// surface where they meet the same solid in about one plane; more than three surfaces become three, the smallest
-/// joining the nearest. About 1 µs a ray on one core. Does not depend on the number of threads.
+/// joining the nearest of the same mode. About 1 µs a ray on one core. Does not depend on the number of threads.
 Surfaces traceSurfaces(std::span<const Solid> solids, std::span<const Mesh> meshes, const layout::SplatCamera& camera);
 
 }  // namespace mote

@@ -72,5 +72,15 @@ TEST(LightCommand, WritesWhatTheDefinitionGivesForEveryParticle) {
   }
 }
 
+TEST(LightCommand, NeedsNoSprite) {
+  const TempFolder folder;
+  makeBall(folder);
+  writeBytes(folder.file("scene.json"),
+             R"({"particles": [{"file": "ball.prt"}], "view": {"sprite_color": "gone.png"}})");
+  const ProcessResult result =
+      mote({"light", folder.file("scene.json"), "-o", folder.file("lit.prt"), "--lighting", "cpu"});
+  EXPECT_EQ(result.exitCode, 0) << result.err;
+}
+
 }  // namespace
 }  // namespace mote::test

@@ -1,9 +1,15 @@
 // mote render from the outside: what it writes, what it refuses before any work, and what it leaves behind.
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 
+#include "host/core/random.h"
 #include "host/image/exr.h"
+#include "host/image/png.h"
 #include "host/particles/prt_writer.h"
 #include "tests/cli/mote_program.h"
 
@@ -170,6 +176,187 @@ TEST_F(MoteRender, StatsHoldTheDevicesOwnSecondsOfEachStage) {
   EXPECT_GT(frame["bytes"]["device"], 2000 * 20) << "the tree alone takes 20 bytes a particle";
 }
 
+TEST_F(MoteRender, StatsTellTheErrorOfASubsampleOnlyWhereItWasMeasured) {
+  writeBytes(scene_, R"({"particles": [{"generate": "ball", "count": 3000}], "output": {"size": [32, 24]}})");
+  const auto subsamples = [&](const Arguments& settings, const std::string& frames = "1-1") {
+    Arguments arguments{"-o", folder_.file("out.#.exr"), "--frames", frames, "--stats", folder_.file("stats.json")};
+    for (const std::string& setting : settings) arguments.insert(arguments.end(), {"--set", setting});
+    const ProcessResult result = render(arguments);
+    EXPECT_EQ(result.exitCode, 0) << result.err;
+    json found = json::array();
+    const json stats = json::parse(readBytes(folder_.file("stats.json")));
+    for (const json& frame : stats["frames"]) found.push_back(frame["subsample"]);
+    // The picture's header says the same.
+    const json header = json::parse(exrStrings(folder_.file("out.1.exr")).at("mote:stats"));
+    EXPECT_EQ(header["subsample"], found[0]);
+    return found;
+  };
+  EXPECT_EQ(subsamples({}).dump(), R"([{"error":0.0,"fraction":1.0}])");
+  const json fixed = subsamples({"/lighting/subsample=0.25", "/lighting/error=0.05"});
+  EXPECT_EQ(fixed[0]["fraction"], 0.25);
+  EXPECT_TRUE(fixed[0]["error"].is_null()) << "nobody measured it";
+  const json measured = subsamples({R"(/lighting/subsample="auto")", "/lighting/error=0.05"}, "1-2");
+  ASSERT_EQ(measured.size(), 2u);
+  EXPECT_GT(measured[0]["fraction"], 0);
+  EXPECT_LT(measured[0]["fraction"], 1);
+  EXPECT_GT(measured[0]["error"], 0);
+  EXPECT_LE(measured[0]["error"], 0.05);
+  EXPECT_EQ(measured[1]["fraction"], measured[0]["fraction"]);
+  EXPECT_TRUE(measured[1]["error"].is_null()) << "the second frame keeps the share and measures nothing";
+}
+
+/// ball.prt: 2,000 particles in a ball, each with the ID that `id` gives it.
+template <class Id>
+void writeBallWithIds(const TempFolder& folder, const Id& id) {
+  std::vector<vec3> position;
+  std::vector<std::uint64_t> ids;
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    Random random(3, i);
+    position.push_back(vec3(random.direction() * std::cbrt(random.uniform())));
+    ids.push_back(id(i));
+  }
+  const std::vector<PrtColumn> columns{PrtColumn::of("Position", std::span<const vec3>(position)),
+                                       PrtColumn::of("ID", std::span<const std::uint64_t>(ids))};
+  writePrt(folder.file("ball.prt"), columns);
+}
+
+TEST_F(MoteRender, GoesByTheIndexWhereTooManyParticlesShareAnId) {
+  const auto frameOf = [&](const Arguments& settings) {
+    Arguments arguments{"-o", folder_.file("out.exr"), "--stats", folder_.file("stats.json")};
+    for (const std::string& setting : settings) arguments.insert(arguments.end(), {"--set", setting});
+    const ProcessResult result = render(arguments);
+    EXPECT_EQ(result.exitCode, 0) << result.err;
+    return json::parse(readBytes(folder_.file("stats.json")))["frames"][0];
+  };
+  const Arguments tenth{"/lighting/subsample=0.1"};
+  writeBallWithIds(folder_, [](std::uint64_t i) { return i; });
+  const json byIndex = frameOf(tenth);
+  EXPECT_TRUE(byIndex["warnings"].empty()) << byIndex["warnings"];
+  writeBallWithIds(folder_, [](std::uint64_t i) { return i % 1000; });  // as two sources would have it
+  EXPECT_TRUE(frameOf(tenth)["warnings"].empty());
+  for (const std::uint64_t ids : {1, 20}) {
+    writeBallWithIds(folder_, [&](std::uint64_t i) { return 7 + i % ids; });
+    const json shared = frameOf(tenth);
+    EXPECT_EQ(shared["in_octree"], byIndex["in_octree"]);
+    ASSERT_EQ(shared["warnings"].size(), 1u) << shared["warnings"];
+    EXPECT_TRUE(contains(shared["warnings"][0], fmt::format("ID is no name of a particle: {}", 2000 / ids)));
+    EXPECT_TRUE(frameOf({})["warnings"].empty()) << "all particles are in the octree: nothing is chosen";
+  }
+}
+
+TEST_F(MoteRender, WarnsWhereASubsampleLeavesNothingInTheOctree) {
+  makeBall(folder_);
+  const ProcessResult result = render(
+      {"-o", folder_.file("out.exr"), "--set", "/lighting/subsample=1e-6", "--stats", folder_.file("stats.json")});
+  ASSERT_EQ(result.exitCode, 0) << result.err;
+  const json frame = json::parse(readBytes(folder_.file("stats.json")))["frames"][0];
+  EXPECT_EQ(frame["in_octree"], 0);
+  ASSERT_EQ(frame["warnings"].size(), 1u);
+  EXPECT_TRUE(contains(frame["warnings"][0], "leaves none of the 2000 particles in the octree"));
+}
+
+TEST_F(MoteRender, SecondsOfSolidsAreTheirOwnAndTheLogNamesThem) {
+  makeBall(folder_);
+  writeBytes(folder_.file("wall.obj"), "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n");
+  const auto secondsOf = [&](const Arguments& settings, std::string& log) {
+    Arguments arguments{"-o", folder_.file("out.exr"), "--stats", folder_.file("stats.json")};
+    for (const std::string& setting : settings) arguments.insert(arguments.end(), {"--set", setting});
+    const ProcessResult result = render(arguments);
+    EXPECT_EQ(result.exitCode, 0) << result.err;
+    log = result.err;
+    return json::parse(readBytes(folder_.file("stats.json")))["frames"][0]["seconds"];
+  };
+  std::string log;
+  EXPECT_FALSE(secondsOf({}, log).contains("solids"));
+  EXPECT_FALSE(contains(log, "solids"));
+  for (const char* mode : {"shaded", "hidden"}) {
+    const json seconds = secondsOf({fmt::format(R"(/solids=[{{"file": "wall.obj", "mode": "{}"}}])", mode)}, log);
+    ASSERT_TRUE(seconds.contains("solids")) << mode;
+    EXPECT_GT(seconds["solids"], 0) << mode;
+    EXPECT_TRUE(contains(log, ", solids "));
+    double sum = 0;
+    for (const auto& [stage, value] : seconds.items()) sum += stage == "total" ? 0 : value.get<double>();
+    EXPECT_LE(sum, seconds["total"].get<double>() + 1e-5) << "no second counts twice: " << seconds;
+  }
+}
+
+// ---- sprites ----
+
+/// One particle of radius 1 at the origin before a camera 4 units away, lit by a sun from there: τ = ln 2 in its
+/// middle.
+constexpr const char* kSpriteScene = R"({
+  "particles": [{"file": "one.prt", "radius": 1}],
+  "medium": {"density_mode": "peak", "density_scale": 1, "albedo": [1, 1, 1]},
+  "lights": [{"name": "sun", "type": "directional", "direction": [0, 0, -1], "irradiance": 10}],
+  "camera": {"position": [0, 0, 4], "target": [0, 0, 0], "fov": 40, "near": 0.1, "far": 50},
+  "output": {"size": [65, 65], "precision": "float"}
+})";
+
+TEST_F(MoteRender, SpritesColourAndFadeAParticleAsTheirPixelsSay) {
+  const std::vector<vec3> position{{0, 0, 0}};
+  const std::vector<float> density{std::log(2.0f)};
+  const std::vector<PrtColumn> columns{PrtColumn::of("Position", std::span<const vec3>(position)),
+                                       PrtColumn::of("Density", std::span<const float>(density))};
+  writePrt(folder_.file("one.prt"), columns);
+  writeBytes(scene_, kSpriteScene);
+  // One pixel each, so that the middle of the splat is that very colour. An EXR's name may be in capitals.
+  writePngBytes(folder_.file("color.png"), {188, 51, 255}, 1, 1);
+  writePngBytes(folder_.file("opacity.png"), {51, 51, 51}, 1, 1);
+  Image color(1, 1), opacity(1, 1);
+  color.pixels[0] = vec4(2, 0.25f, 0, 1), opacity.pixels[0] = vec4(0.7f, 0.7f, 0.7f, 0.4f);
+  writeExr(folder_.file("COLOR.EXR"), color, {.precision = ExrPrecision::Float});
+  writeExr(folder_.file("opacity.exr"), opacity, {.precision = ExrPrecision::Float});
+  const double light = 0.5 * 10 / (4 * kPi);  // α · irradiance · isotropic phase, of a white particle
+  struct Case {
+    const char *color, *opacity;
+    dvec3 factor;
+    double share;
+  };
+  // 188, 51, 255 decoded by IEC 61966-2-1; 51 / 255 as it stands; alpha where there is any.
+  const Case cases[] = {{"", "", dvec3(1), 1},
+                        {"color.png", "", {0.502886, 0.033105, 1}, 1},
+                        {"COLOR.EXR", "", {2, 0.25, 0}, 1},
+                        {"", "opacity.png", dvec3(1), 0.2},
+                        {"", "opacity.exr", dvec3(1), 0.4},
+                        {"COLOR.EXR", "opacity.png", {2, 0.25, 0}, 0.2}};
+  for (const char* where : {"cpu", "gpu"})
+    for (const auto& [colorFile, opacityFile, factor, share] : cases) {
+      const ProcessResult result =
+          test::mote({"render", scene_, "--lighting", "cpu", "--raster", where, "-o", folder_.file("out.exr"), "--set",
+                      fmt::format("/view/sprite_color=\"{}\"", colorFile), "--set",
+                      fmt::format("/view/sprite_opacity=\"{}\"", opacityFile), "--stats", folder_.file("stats.json")},
+                     test::kOnLavapipe);
+      ASSERT_EQ(result.exitCode, 0) << result.err;
+      const vec4 middle = readExr(folder_.file("out.exr")).at(32, 32);
+      EXPECT_NEAR(middle.w, 0.5 * share, 1e-5) << where << " " << colorFile << " " << opacityFile;
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(middle[c], light * share * factor[c], 1e-5 * (1 + factor[c])) << where << " " << colorFile;
+      // What a picture is made from stands in its statistics.
+      const json inputs = json::parse(readBytes(folder_.file("stats.json")))["frames"][0]["inputs"];
+      std::string files;
+      for (const json& input : inputs) {
+        files += input["file"].get<std::string>() + " ";
+        EXPECT_EQ(input["sha256"].get<std::string>().size(), 64u);
+      }
+      EXPECT_EQ(inputs.size(), 1u + (*colorFile ? 1u : 0u) + (*opacityFile ? 1u : 0u));
+      for (const char* name : {colorFile, opacityFile}) EXPECT_TRUE(contains(files, name));
+    }
+}
+
+TEST_F(MoteRender, RefusesSpritesWithColoursThatAreNone) {
+  makeBall(folder_);
+  Image sprite(3, 2);
+  for (vec4& pixel : sprite.pixels) pixel = vec4(1);
+  for (const float bad : {-0.5f, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    sprite.at(2, 1).y = bad;
+    writeExr(folder_.file("puff.exr"), sprite, {.precision = ExrPrecision::Float});
+    expectRefusal(
+        folder_.file("puff.exr") + ": pixel 2, 1: expected finite colours ≥ 0, got 1, " + fmt::format("{}", bad),
+        {"--set", R"(/view/sprite_color="puff.exr")"});
+  }
+  expectRefusal("pixel 2, 1: expected finite numbers", {"--set", R"(/view/sprite_opacity="puff.exr")"});
+}
+
 TEST_F(MoteRender, PutsCameraFrameAndStatisticsIntoTheHeader) {
   makeBall(folder_);
   ASSERT_EQ(render({"-o", folder_.file("out.exr")}).exitCode, 0);
@@ -177,9 +364,13 @@ TEST_F(MoteRender, PutsCameraFrameAndStatisticsIntoTheHeader) {
   for (const char* attribute : {"worldToCamera", "worldToNDC", "framesPerSecond", "pixelAspectRatio"})
     EXPECT_TRUE(contains(bytes, attribute));
   bool found = false;
-  for (const auto& [name, value] : exrStrings(folder_.file("out.exr")))
+  const auto strings = exrStrings(folder_.file("out.exr"));
+  for (const auto& [name, value] : strings)
     if (json::accept(value)) found = found || json::parse(value).dump().find("\"particles\":2000") != std::string::npos;
   EXPECT_TRUE(found) << "no attribute holds the statistics";
+  EXPECT_FALSE(strings.contains("mote:Z")) << "there is no Z";
+  ASSERT_EQ(render({"-o", folder_.file("z.exr"), "--set", R"(/output/aovs=["Z"])"}).exitCode, 0);
+  EXPECT_TRUE(contains(exrStrings(folder_.file("z.exr")).at("mote:Z"), "distance along the view axis"));
 }
 
 TEST_F(MoteRender, WritesThePixelAspectIntoTheHeader) {
@@ -331,6 +522,33 @@ TEST_F(MoteRender, ASignalIsExitCode130AndLeavesOnlyWholePictures) {
       EXPECT_EQ(readExr(folder_.file(name)).width, 64);
     }
   }
+}
+
+TEST(RenderCommand, SaysHowEachLightKeptTheErrorInStatsAndHeader) {
+  const test::TempFolder folder;
+  test::writeBytes(folder.file("cloud.json"), R"({
+    "particles": [{"generate": "cloud", "count": 60000}],
+    "lights": [{"name": "key", "position": [2, 3, 1]}, {"name": "fill", "position": [-2, 0, 1], "casts_shadows": false}],
+    "lighting": {"error": 0.02}, "output": {"size": [64, 36]}})");
+  const std::string stats = folder.file("stats.json"), picture = folder.file("cloud.exr");
+  const test::ProcessResult result = test::mote(
+      {"render", folder.file("cloud.json"), "-o", picture, "--lighting", "cpu", "--raster", "cpu", "--stats", stats},
+      test::kWithoutVulkan);
+  ASSERT_EQ(result.exitCode, 0) << result.err;
+  const nlohmann::json found = nlohmann::json::parse(readBytes(stats))["frames"][0]["light_error"];
+  ASSERT_EQ(found.size(), 2u);
+  const nlohmann::json& key = found[0];
+  EXPECT_EQ(key["light"], "key");
+  EXPECT_EQ(key["method"], "light_grid");
+  EXPECT_NEAR(key["allowed"].get<double>(), 0.02, 1e-8);
+  EXPECT_GT(key["cell"].get<double>(), 0);
+  EXPECT_GT(key["mean"].get<double>(), 0);
+  EXPECT_LE(key["mean"].get<double>(), key["upper"].get<double>());
+  EXPECT_LE(key["upper"].get<double>(), 0.02 + 1e-8);
+  EXPECT_LE(key["p99"].get<double>(), key["max"].get<double>());
+  EXPECT_EQ(key["probes"], 2048);
+  EXPECT_EQ(found[1]["method"], "exact");
+  EXPECT_TRUE(contains(readBytes(picture), "light_grid"));
 }
 
 }  // namespace
