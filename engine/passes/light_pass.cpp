@@ -17,9 +17,7 @@ namespace mote {
 struct LightPass::Tuning {
   BeamLimits beams;
   std::uint32_t groupSize;     ///< a multiple of every subgroup size
-  std::uint32_t raysEach;      ///< of an invocation
-  std::uint32_t block;         ///< particles
-  bool broadcast;              ///< lanes load one of the block each
+  std::uint32_t groupRays, groups;  ///< rays of a group, groups of a packet: at most the least subgroup size
   std::uint32_t foundCapacity, chosenCapacity;
   std::uint32_t pieceColumns, pieceBeams, pieceRays;  ///< at most; beams and rays may be passed by one column's
 };
@@ -91,18 +89,15 @@ layout::LightRay rayOf(const BeamRays& rays, std::size_t k) {
 LightPass::Tuning LightPass::tuning(const Device& device) {
   Tuning t{};
   if (device.isCpu()) {
-    t.beams = {knob("COLUMN", 4096), knob("BEAM", 240)};
-    t.groupSize = t.block = device.subgroupSize();
-    t.broadcast = true;
-    t.raysEach = std::min(knob("RAYS", 8), t.groupSize);
+    t.beams = {knob("COLUMN", 2048), knob("BEAM", 240)};
+    t.groupSize = device.subgroupSize();
+    t.groupRays = std::min(knob("GRAYS", 8), t.groupSize), t.groups = std::min(knob("GROUPS", 4), t.groupSize);
     t.foundCapacity = knob("FOUND", 8192), t.chosenCapacity = knob("CHOSEN", 2048);
     t.pieceColumns = knob("PCOLUMNS", 32), t.pieceBeams = 512, t.pieceRays = 1 << 17;
   } else {
     t.beams = {1024, 256};
     t.groupSize = std::max(64u, device.mostSubgroupSize());
-    t.block = 8;
-    t.broadcast = false;
-    t.raysEach = 2;
+    t.groupRays = t.groups = std::min(4u, device.leastSubgroupSize());
     t.foundCapacity = 8192, t.chosenCapacity = 2048;
     t.pieceColumns = 512, t.pieceBeams = 2048, t.pieceRays = 1 << 19;
   }
@@ -133,13 +128,8 @@ const LightPass::Pipelines& LightPass::pipelines(const Variant& variant) {
                                                 {6, device_.mostSubgroupSize()}};
   made.gather = device_.createComputePipeline(variant.exact ? spirv::light_gather_exact_comp : spirv::light_gather_comp,
                                               sizeof(layout::LightParams), constants);
-  constants.insert(constants.end(), {{7, t.raysEach}, {8, falloff_}, {9, endpoint_}, {10, t.block}, {11, t.broadcast}});
-  for (const std::uint32_t on : {0u, 1u}) {
-    constants.push_back({12, on});
-    (on ? made.sumOn : made.sum) =
-        device_.createComputePipeline(spirv::light_sum_comp, sizeof(layout::LightParams), constants);
-    constants.pop_back();
-  }
+  constants.insert(constants.end(), {{7, t.groupRays}, {8, t.groups}, {9, falloff_}, {10, endpoint_}, {11, variant.perspective}});
+  made.sum = device_.createComputePipeline(spirv::light_sum_comp, sizeof(layout::LightParams), constants);
   return made;
 }
 
@@ -254,10 +244,10 @@ std::vector<float> LightPass::run(const Piece& piece, float limit) {
   deviceBytes_ = std::max(deviceBytes_, nodes_.size() + particles_.size() + peaks_.size() + to.bytes());
   device_.upload<layout::LightColumn>(to.columns, piece.columns);
   device_.upload<vec4>(to.planes, piece.planes);
-  device_.upload<layout::LightBeam>(to.beams, piece.beams);
   device_.upload<layout::LightRay>(to.rays, piece.rays);
   std::vector<layout::LightWalk> walks(columns);
   device_.upload<layout::LightWalk>(to.walks, walks);
+  device_.upload<float>(to.depths, std::vector<float>(channels * rays, 0.0f));
 
   layout::LightParams params{};
   params.nodes = nodes_.address(), params.particles = particles_.address(), params.peaks = peaks_.address();
@@ -266,7 +256,7 @@ std::vector<float> LightPass::run(const Piece& piece, float limit) {
   params.found = to.found.address(), params.order = to.order.address(), params.chosen = to.chosen.address();
   params.chosenIndex = to.chosenIndex.address();
   params.nodeCount = static_cast<layout::uint>(tree_->nodeCount());
-  params.columnCount = static_cast<layout::uint>(columns), params.beamCount = static_cast<layout::uint>(beams);
+  params.columnCount = static_cast<layout::uint>(columns);
   params.rayCount = static_cast<layout::uint>(rays);
   params.opticalDepthLimit = limit;
   params.slotCount = static_cast<layout::uint>(tree_->particleCount());
@@ -274,25 +264,31 @@ std::vector<float> LightPass::run(const Piece& piece, float limit) {
   const Pipelines& with = pipelines(piece.variant);
   // A subgroup may be as large as the device likes: enough workgroups for the largest, those beyond the last end.
   const std::size_t eachGroup = t.groupSize / device_.mostSubgroupSize();
-  const auto unfinished = [&](const layout::LightWalk& w) { return w.slot < w.end || w.node < params.nodeCount; };
-  for (bool begins = true; begins || std::any_of(walks.begin(), walks.end(), unfinished); begins = false) {
+  std::vector<layout::LightBeam> todo = piece.beams;
+  while (!todo.empty()) {
+    device_.upload<layout::LightBeam>(to.beams, todo);
+    params.beamCount = static_cast<layout::uint>(todo.size());
     queries_.reset();
     device_.run([&](CommandBuffer& commands) {
       const std::uint32_t gather = queries_.begin(commands, "gather");
-      if (!begins) commands.barrier(barrier::computeToCompute);
       commands.dispatchRow(with.gather, params, (columns + eachGroup - 1) / eachGroup);
       queries_.end(commands, gather);
       commands.barrier(barrier::computeToCompute);
       const std::uint32_t sum = queries_.begin(commands, "sum");
-      commands.dispatchRow(begins ? with.sum : with.sumOn, params, (beams + eachGroup - 1) / eachGroup);
+      commands.dispatchRow(with.sum, params, (todo.size() + eachGroup - 1) / eachGroup);
       queries_.end(commands, sum);
     });
     for (const StageTime& stage : queries_.results()) {
       deviceSeconds_ += stage.seconds;
       if (std::getenv("SHOW")) std::fprintf(stderr, "%s %.1f ms  ", stage.stage.c_str(), stage.seconds * 1e3);
     }
-    if (std::getenv("SHOW")) std::fprintf(stderr, "%zu columns %zu beams %zu rays\n", columns, beams, rays);
+    if (std::getenv("SHOW")) std::fprintf(stderr, "%zu columns %zu beams %zu rays\n", columns, todo.size(), rays);
+    // Beams of columns whose walk has not come to its end go on.
     walks = device_.download<layout::LightWalk>(to.walks, columns);
+    std::erase_if(todo, [&](const layout::LightBeam& beam) {
+      const layout::LightWalk& walk = walks[beam.column];
+      return walk.slot >= walk.end && walk.node >= params.nodeCount;
+    });
   }
   return device_.download<float>(to.depths, channels * rays);
 }

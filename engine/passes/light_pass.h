@@ -51,7 +51,7 @@ class LightPass {
     auto operator<=>(const Variant&) const = default;
   };
   struct Pipelines {
-    ComputePipeline gather, sum, sumOn;  ///< sumOn: adds to what is there
+    ComputePipeline gather, sum;
   };
   /// Columns that are computed together: what the host has set up, and where it is on the device.
   struct Piece {

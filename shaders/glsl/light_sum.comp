@@ -1,37 +1,42 @@
 // The optical depths of a beam's rays from what light_gather.comp found for its column: the twin of choose and sum in
 // host/lighting (beam_kernel.h), for one subgroup a beam.
 //
-// First the column's particles that may touch the beam are chosen, one a lane, in the order of their reach. Then rays go
-// in packets of kRays a lane. A beam's rays stand by their depth, so each kRays-th of a packet (a group: one ray a lane)
-// covers a short piece of it: what lies before the piece is wholly in the way of all its rays and goes through the short
-// formula, also for all groups behind; what may straddle a start goes through the long one, for that group alone; what
-// lies behind is never looked at. Every loop runs over whole blocks of particles with the same bounds in all lanes: on
-// hardware there is no divergence and a particle is one load a subgroup; on lavapipe, where a branch does both sides and
-// a load inside of a loop is one a lane, each lane loads a particle of the block, which is then broadcast.
+// First the column's particles that may touch the beam are chosen, in the order of their reach. Then rays go in packets
+// of kRays. A lane has a particle of its own and all rays of the packet, the same in all lanes; sums are added up over
+// the lanes at the end. A beam's rays stand by their depth, so a group of kGroupRays covers a short piece of it: what
+// lies before the piece is wholly in the way of all its rays and goes through the short formula, also for all groups
+// behind; what may straddle a start goes through the long one, for that group alone; what lies behind is never looked
+// at. Every loop runs over whole blocks of particles, a subgroup wide, with the same bounds in all lanes.
+//
+// On hardware rays are scalars, particles are loads side by side, and nothing diverges. On lavapipe (Mesa 22.3) a load
+// inside of a loop takes about 90 instructions for each component of a subgroup, and a broadcast 54: so what is loaded
+// must meet many rays, and nothing is broadcast.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "lib/light_scratch.glsl"
 
-layout(constant_id = 7) const uint kRays = 2;
-layout(constant_id = 8) const uint kFalloff = 0;
-layout(constant_id = 9) const uint kEndpoint = 0;
-layout(constant_id = 10) const uint kBlock = 8;          // particles; a power of two
-layout(constant_id = 11) const bool kBroadcast = false;  // kBlock lanes load one each
-layout(constant_id = 12) const bool kGoOn = false;       // add to what is there
+layout(constant_id = 7) const uint kGroupRays = 4;  // at most as many as a subgroup has lanes
+layout(constant_id = 8) const uint kGroups = 4;     // likewise, and at most 8
+layout(constant_id = 9) const uint kFalloff = 0;
+layout(constant_id = 10) const uint kEndpoint = 0;
+layout(constant_id = 11) const bool kNearLight = false;  // there may be particles near a point light
 
 #include "lib/cap.glsl"
 #include "lib/falloff.glsl"
 
-const uint kMostGroups = 8;              // kRays at most
-const uint kStride = 64;                 // particles between two looks at whether all is dark
-const float kBehind = 2.07;              // 1 + kBehindRadii of host/lighting/column.h
+const uint kRays = kGroupRays * kGroups;
+const uint kMostGroups = 8;
+const uint kStride = 64;  // particles between two looks at whether all is dark
+const float kBehind = 2.07;  // 1 + kBehindRadii of host/lighting/column.h
 const float kGreatestInverseArea = 1e36;
 
 LightBeam beam;
 LightWalk walk;
 uint beamIndex, chosenCount;
+// Of the packet's rays: the same in all lanes …
 float rayU[kRays], rayV[kRays], rayULow[kRays], rayVLow[kRays], rayDepth[kRays], rayDepthLow[kRays], rayNorm[kRays];
 uint raySelf[kRays];
+// … and what the lane's particles add to each.
 float sum[kRays], sumGreen[kRays], sumBlue[kRays];
 
 /// The particles from `at` (in `order`) on that may touch the beam, until the list is full; returns where to go on.
@@ -40,7 +45,7 @@ uint choose(uint at) {
   const uint places = foundList(beam.column, 0), peaks = foundList(beam.column, 2), order = orderList(beam.column);
   const uint to = chosenList(beamIndex, 0), colours = chosenList(beamIndex, 1), indices = beamIndex * kChosenCapacity;
   chosenCount = 0;
-  while (at < walk.count && chosenCount + width + kBlock <= kChosenCapacity) {
+  while (at < walk.count && chosenCount + 2 * width <= kChosenCapacity) {
     const uint from = params.order.at[order + min(at + lane, walk.count - 1)];
     const vec4 p = params.found.at[places + from];
     const float extent = p.z * beam.extentScale;
@@ -60,12 +65,9 @@ uint choose(uint at) {
     at += width;
   }
   // The last block is filled up with nothing.
-  for (uint place = chosenCount + lane; subgroupAny(place < chosenCount + kBlock); place += width)
-    if (place < chosenCount + kBlock) {
-      params.chosen.at[to + place] = vec4(0);
-      if (kChannels == 3) params.chosen.at[colours + place] = vec4(0);
-      params.chosenIndex.at[indices + place] = 0;
-    }
+  params.chosen.at[to + chosenCount + lane] = vec4(0);
+  if (kChannels == 3) params.chosen.at[colours + chosenCount + lane] = vec4(0);
+  params.chosenIndex.at[indices + chosenCount + lane] = 0;
   shareWrites();
   return at;
 }
@@ -98,31 +100,28 @@ void add(uint k, float red, vec2 others, float share) {
   if (kChannels == 3) sumGreen[k] += others.x * share, sumBlue[k] += others.y * share;
 }
 
+/// The lane's particle of a block: place, and what only some variants need.
+struct Particle {
+  vec4 place;   // u, v, 1/r², peak
+  vec2 others;  // the other peaks
+  vec2 low;
+};
+Particle particleAt(uint at) {
+  Particle p = Particle(params.chosen.at[chosenList(beamIndex, 0) + at], vec2(0), vec2(0));
+  if (kChannels == 3) p.others = params.chosen.at[chosenList(beamIndex, 1) + at].yz;
+  if (kCareful)
+    p.low = params.found.at[foundList(beam.column, 3) + params.chosenIndex.at[beamIndex * kChosenCapacity + at]].xy;
+  return p;
+}
+
 /// A block that lies before the starts of the groups from `group` on.
-void addBefore(uint at, const uint group) {
-  const uint base = chosenList(beamIndex, 0) + at, colours = chosenList(beamIndex, 1) + at,
-             indices = beamIndex * kChosenCapacity + at, lows = foundList(beam.column, 3);
-  const uint lane = kBroadcast ? gl_SubgroupInvocationID : 0;
-  vec4 mine = vec4(0);
-  vec2 mineOthers = vec2(0), mineLow = vec2(0);
-  if (kBroadcast) {
-    mine = params.chosen.at[base + lane];
-    if (kChannels == 3) mineOthers = params.chosen.at[colours + lane].yz;
-    if (kCareful) mineLow = params.found.at[lows + params.chosenIndex.at[indices + lane]].xy;
-  }
-  [[unroll]] for (uint i = 0; i < kBlock; ++i) {
-    vec4 p;
-    vec2 others = vec2(0), low = vec2(0);
-    if (kBroadcast) {
-      p = subgroupBroadcast(mine, i);
-      if (kChannels == 3) others = subgroupBroadcast(mineOthers, i);
-      if (kCareful) low = subgroupBroadcast(mineLow, i);
-    } else {
-      p = params.chosen.at[base + i];
-      if (kChannels == 3) others = params.chosen.at[colours + i].yz;
-      if (kCareful) low = params.found.at[lows + params.chosenIndex.at[indices + i]].xy;
+void addBefore(uint block, const uint group) {
+  const Particle p = particleAt(block + gl_SubgroupInvocationID);
+  [[unroll]] for (uint g = group; g < kGroups; ++g) {
+    [[unroll]] for (uint j = 0; j < kGroupRays; ++j) {
+      const uint k = g * kGroupRays + j;
+      add(k, p.place.w, p.others, falloff(separation(p.place, p.low, k), kFalloff));
     }
-    [[unroll]] for (uint k = group; k < kRays; ++k) add(k, p.w, others, falloff(separation(p, low, k), kFalloff));
   }
 }
 
@@ -135,152 +134,153 @@ float softShare(float q, float t, float radius, float inverseRadius) {
 }
 
 /// A block that may straddle the starts of one group.
-void addAtStart(uint at, const uint k) {
-  const uint base = chosenList(beamIndex, 0) + at, colours = chosenList(beamIndex, 1) + at,
-             indices = beamIndex * kChosenCapacity + at, ends = foundList(beam.column, 1),
-             peaks = foundList(beam.column, 2), lows = foundList(beam.column, 3);
-  vec4 mine = vec4(0), mineEnd = vec4(0), mineLow = vec4(0);
-  vec2 mineOthers = vec2(0);
-  if (kBroadcast) {
-    const uint from = params.chosenIndex.at[indices + gl_SubgroupInvocationID];
-    mine = params.chosen.at[base + gl_SubgroupInvocationID];
-    mineEnd = params.found.at[ends + from];
-    mineLow.z = params.found.at[peaks + from].w;
-    if (kCareful) mineLow.xy = params.found.at[lows + from].xy;
-    if (kChannels == 3) mineOthers = params.chosen.at[colours + gl_SubgroupInvocationID].yz;
-  }
-  [[unroll]] for (uint i = 0; i < kBlock; ++i) {
-    vec4 p, end, low = vec4(0);
-    vec2 others = vec2(0);
-    if (kBroadcast) {
-      p = subgroupBroadcast(mine, i), end = subgroupBroadcast(mineEnd, i), low = subgroupBroadcast(mineLow, i);
-      if (kChannels == 3) others = subgroupBroadcast(mineOthers, i);
-    } else {
-      const uint from = params.chosenIndex.at[indices + i];
-      p = params.chosen.at[base + i];
-      end = params.found.at[ends + from];
-      low.z = params.found.at[peaks + from].w;
-      if (kCareful) low.xy = params.found.at[lows + from].xy;
-      if (kChannels == 3) others = params.chosen.at[colours + i].yz;
-    }
-    const float radius = end.y, inverseRadius = 1.0 / radius;
-    const float q = separation(p, low.xy, k);
-    float t = (rayDepth[k] - end.x) + (rayDepthLow[k] - low.z);
+void addAtStart(uint block, const uint group) {
+  const uint at = block + gl_SubgroupInvocationID;
+  const Particle p = particleAt(at);
+  const uint from = params.chosenIndex.at[beamIndex * kChosenCapacity + at];
+  const vec4 end = params.found.at[foundList(beam.column, 1) + from];
+  const float depthLow = params.found.at[foundList(beam.column, 2) + from].w;
+  const float radius = end.y, inverseRadius = 1.0 / radius, area = radius * radius;
+  const float inverseDepth = kPerspective ? 1.0 / (end.x + beam.depthBase) : 0.0;
+  const float sagFirst = 0.5 * inverseDepth, sagRatio = 0.25 * (inverseDepth * inverseDepth);
+  const float inverseArea = min(inverseRadius * inverseRadius, kGreatestInverseArea);
+  [[unroll]] for (uint j = 0; j < kGroupRays; ++j) {
+    const uint k = group * kGroupRays + j;
+    const float q = separation(p.place, p.low, k);
+    float t = (rayDepth[k] - end.x) + (rayDepthLow[k] - depthLow);
     if (kPerspective) {
-      const float inverseDepth = 1.0 / (end.x + beam.depthBase), b2 = q * (radius * radius);
-      t += b2 * (0.5 * inverseDepth) * (1.0 + 0.25 * (b2 * (inverseDepth * inverseDepth)));
+      const float b2 = q * area;
+      t += b2 * sagFirst * (1.0 + b2 * sagRatio);
     }
     float share;
     if (kEndpoint == kEndpointClamp) {
       const float back = min(t, 0.0);
-      share = falloff(q + back * back * min(inverseRadius * inverseRadius, kGreatestInverseArea), kFalloff);
+      share = falloff(q + back * back * inverseArea, kFalloff);
     } else {
       share = softShare(q, t, radius, inverseRadius);
     }
-    add(k, p.w, others, raySelf[k] == floatBitsToUint(end.w) ? 0.0 : share);
+    add(k, p.place.w, p.others, raySelf[k] == floatBitsToUint(end.w) ? 0.0 : share);
   }
 }
 
 /// Those near a point light, in plain coordinates.
 void addNearLight() {
-  for (uint j = 0; j < walk.nearCount; ++j) {
-    const uint at = kFoundCapacity - 1 - j;
-    const vec4 p = params.found.at[foundList(beam.column, 0) + at], end = params.found.at[foundList(beam.column, 1) + at],
-               peak = params.found.at[foundList(beam.column, 2) + at];
-    [[unroll]] for (uint k = 0; k < kRays; ++k) {
-      const vec3 own = normalize(vec3(rayU[k], rayV[k], 1.0));
-      const vec3 direction = beam.turnU * own.x + beam.turnV * own.y + beam.turnW * own.z;
-      const float len = rayDepth[k] + beam.depthBase, fromLight = dot(p.xyz, direction);
-      const vec3 e = p.xyz - (kEndpoint == kEndpointClamp ? clamp(fromLight, 0.0, len) : fromLight) * direction;
-      const float q = dot(e, e) * p.w;
-      float share = falloff(q, kFalloff);
-      if (kEndpoint == kEndpointSoft) {
-        const float halfChord = end.y * sqrt(max(1.0 - q, 0.0));
-        share = share * cap(len - fromLight, halfChord) * cap(fromLight, halfChord);
+  uint near = gl_SubgroupInvocationID;
+  do {
+    const uint at = kFoundCapacity - 1 - min(near, max(walk.nearCount, 1) - 1);
+    const vec4 p = params.found.at[foundList(beam.column, 0) + at], end = params.found.at[foundList(beam.column, 1) + at];
+    vec4 peak = params.found.at[foundList(beam.column, 2) + at];
+    if (near >= walk.nearCount) peak = vec4(0);
+    [[unroll]] for (uint g = 0; g < kGroups; ++g) {
+      [[unroll]] for (uint j = 0; j < kGroupRays; ++j) {
+        const uint k = g * kGroupRays + j;
+        const vec3 own = normalize(vec3(rayU[k], rayV[k], 1.0));
+        const vec3 direction = beam.turnU * own.x + beam.turnV * own.y + beam.turnW * own.z;
+        const float len = rayDepth[k] + beam.depthBase, fromLight = dot(p.xyz, direction);
+        const vec3 e = p.xyz - (kEndpoint == kEndpointClamp ? clamp(fromLight, 0.0, len) : fromLight) * direction;
+        const float q = dot(e, e) * p.w;
+        float share = falloff(q, kFalloff);
+        if (kEndpoint == kEndpointSoft) {
+          const float halfChord = end.y * sqrt(max(1.0 - q, 0.0));
+          share = share * cap(len - fromLight, halfChord) * cap(fromLight, halfChord);
+        }
+        add(k, peak.x, peak.yz, raySelf[k] == floatBitsToUint(end.w) ? 0.0 : share);
       }
-      add(k, peak.x, peak.yz, raySelf[k] == floatBitsToUint(end.w) ? 0.0 : share);
     }
-  }
+    near += gl_SubgroupSize;
+  } while (subgroupAny(near < walk.nearCount));
 }
 
-bool allDark() {
-  float least = sum[0];
-  [[unroll]] for (uint k = 0; k < kRays; ++k) {
-    least = min(least, sum[k]);
-    if (kChannels == 3) least = min(least, min(sumGreen[k], sumBlue[k]));
+/// Whether all rays of the groups from `group` on are beyond the limit. Least of the rays in each lane, then the sum
+/// over the lanes: never more than the least sum, and one sum instead of kRays.
+bool allDark(const uint group) {
+  float least = 1e38;
+  [[unroll]] for (uint g = group; g < kGroups; ++g) {
+    [[unroll]] for (uint j = 0; j < kGroupRays; ++j) {
+      const uint k = g * kGroupRays + j;
+      least = min(least, sum[k]);
+      if (kChannels == 3) least = min(least, min(sumGreen[k], sumBlue[k]));
+    }
   }
-  return subgroupAll(least > params.opticalDepthLimit);
+  return subgroupAdd(least) > params.opticalDepthLimit;
 }
 
 // The loops have their ends behind them: before them lavapipe would run the body once more, for nobody.
-#define ADD_AT_START(K)                                            \
-  if (K < kRays && firstAtStart[K] < endAtStart[K]) {              \
-    uint block = firstAtStart[K];                                  \
-    do {                                                           \
-      addAtStart(block, K);                                        \
-      block += kBlock;                                             \
-    } while (block < endAtStart[K]);                               \
+#define ADD_AT_START(K)                             \
+  if (K < kGroups && firstAtStart[K] < endAtStart[K]) { \
+    uint block = firstAtStart[K];                   \
+    do {                                            \
+      addAtStart(block, K);                         \
+      block += gl_SubgroupSize;                     \
+    } while (block < endAtStart[K]);                \
   }
-#define ADD_BEFORE(K)                                              \
-  if (K < kRays && at < firstAtStart[K] && !dark) {                \
-    do {                                                           \
-      const uint stop = min(at + kStride, firstAtStart[K]);        \
-      do {                                                         \
-        addBefore(at, K);                                          \
-        at += kBlock;                                              \
-      } while (at < stop);                                         \
-      dark = allDark();                                            \
-    } while (at < firstAtStart[K] && !dark);                       \
+#define ADD_BEFORE(K)                                     \
+  if (K < kGroups && at < firstAtStart[K] && !dark) {     \
+    do {                                                  \
+      const uint stop = min(at + kStride, firstAtStart[K]); \
+      do {                                                \
+        addBefore(at, K);                                 \
+        at += gl_SubgroupSize;                            \
+      } while (at < stop);                                \
+      dark = allDark(K);                                  \
+    } while (at < firstAtStart[K] && !dark);              \
   }
 
 /// One packet against what is chosen.
-void addPacket(uint first, bool begins) {
-  const uint lane = gl_SubgroupInvocationID, width = gl_SubgroupSize, last = beam.rayCount - 1;
-  [[unroll]] for (uint k = 0; k < kRays; ++k) {
-    const uint place = first + k * width + lane;
-    const uint ray = beam.firstRay + min(place, last);
-    const LightRay r = params.rays.at[ray];
-    rayU[k] = r.u, rayV[k] = r.v, rayDepth[k] = r.depth, rayDepthLow[k] = r.depthLow, raySelf[k] = r.self;
-    rayULow[k] = rayVLow[k] = 0.0, rayNorm[k] = 1.0;
-    if (kCareful) {
-      rayULow[k] = r.uLow, rayVLow[k] = r.vLow;
-      if (kPerspective) rayNorm[k] = 1.0 / (1.0 + r.u * r.u + r.v * r.v);
-    }
-    sum[k] = sumGreen[k] = sumBlue[k] = 0.0;
-    if (!begins) {
-      sum[k] = params.opticalDepths.at[ray];
-      if (kChannels == 3) {
-        sumGreen[k] = params.opticalDepths.at[params.rayCount + ray];
-        sumBlue[k] = params.opticalDepths.at[2 * params.rayCount + ray];
+void addPacket(uint first) {
+  const uint last = beam.rayCount - 1;
+  [[unroll]] for (uint g = 0; g < kGroups; ++g) {
+    [[unroll]] for (uint j = 0; j < kGroupRays; ++j) {
+      const uint k = g * kGroupRays + j;
+      const LightRay r = params.rays.at[beam.firstRay + min(first + k, last)];
+      rayU[k] = r.u, rayV[k] = r.v, rayDepth[k] = r.depth, rayDepthLow[k] = r.depthLow, raySelf[k] = r.self;
+      rayULow[k] = rayVLow[k] = 0.0, rayNorm[k] = 1.0;
+      if (kCareful) {
+        rayULow[k] = r.uLow, rayVLow[k] = r.vLow;
+        if (kPerspective) rayNorm[k] = 1.0 / (1.0 + r.u * r.u + r.v * r.v);
       }
+      sum[k] = sumGreen[k] = sumBlue[k] = 0.0;
     }
   }
   // Each lane looks up one group.
-  const uint group = min(lane, kRays - 1);
-  const float nearest = params.rays.at[beam.firstRay + min(first + group * width, last)].depth - beam.margin;
-  const float deepest = params.rays.at[beam.firstRay + min(first + group * width + width - 1, last)].depth + beam.margin;
-  const uint from = firstFrom(binOf(nearest, walk)) & ~(kBlock - 1);
+  const uint begin = first + min(gl_SubgroupInvocationID, kGroups - 1) * kGroupRays;
+  const float nearest = params.rays.at[beam.firstRay + min(begin, last)].depth - beam.margin;
+  const float deepest = params.rays.at[beam.firstRay + min(begin + kGroupRays - 1, last)].depth + beam.margin;
+  const uint from = firstFrom(binOf(nearest, walk)) / gl_SubgroupSize * gl_SubgroupSize;
   const uint end = firstFrom(binOf(deepest + kBehind * walk.greatestRadius, walk) + 1);
   uint firstAtStart[kMostGroups], endAtStart[kMostGroups];
-  [[unroll]] for (uint k = 0; k < kRays; ++k)
-    firstAtStart[k] = subgroupBroadcast(from, k), endAtStart[k] = subgroupBroadcast(end, k);
+  [[unroll]] for (uint g = 0; g < kGroups; ++g)
+    firstAtStart[g] = subgroupBroadcast(from, g), endAtStart[g] = subgroupBroadcast(end, g);
 
   ADD_AT_START(0) ADD_AT_START(1) ADD_AT_START(2) ADD_AT_START(3)
   ADD_AT_START(4) ADD_AT_START(5) ADD_AT_START(6) ADD_AT_START(7)
   uint at = 0;
-  bool dark = allDark();
+  bool dark = allDark(0);
   ADD_BEFORE(0) ADD_BEFORE(1) ADD_BEFORE(2) ADD_BEFORE(3)
   ADD_BEFORE(4) ADD_BEFORE(5) ADD_BEFORE(6) ADD_BEFORE(7)
 }
 
+/// Adds to what is there.
 void storePacket(uint first) {
-  [[unroll]] for (uint k = 0; k < kRays; ++k) {
-    const uint place = first + k * gl_SubgroupSize + gl_SubgroupInvocationID;
-    if (place < beam.rayCount) {
-      params.opticalDepths.at[beam.firstRay + place] = sum[k];
+  const uint lane = gl_SubgroupInvocationID;
+  [[unroll]] for (uint g = 0; g < kGroups; ++g) {
+    float red = 0.0, green = 0.0, blue = 0.0;  // of the lane's ray
+    [[unroll]] for (uint j = 0; j < kGroupRays; ++j) {
+      const uint k = g * kGroupRays + j;
+      const float total = subgroupAdd(sum[k]);
+      red = lane == j ? total : red;
       if (kChannels == 3) {
-        params.opticalDepths.at[params.rayCount + beam.firstRay + place] = sumGreen[k];
-        params.opticalDepths.at[2 * params.rayCount + beam.firstRay + place] = sumBlue[k];
+        const float totalGreen = subgroupAdd(sumGreen[k]), totalBlue = subgroupAdd(sumBlue[k]);
+        green = lane == j ? totalGreen : green, blue = lane == j ? totalBlue : blue;
+      }
+    }
+    const uint place = first + g * kGroupRays + lane;
+    if (lane < kGroupRays && place < beam.rayCount) {
+      const uint ray = beam.firstRay + place;
+      params.opticalDepths.at[ray] += red;
+      if (kChannels == 3) {
+        params.opticalDepths.at[params.rayCount + ray] += green;
+        params.opticalDepths.at[2 * params.rayCount + ray] += blue;
       }
     }
   }
@@ -292,19 +292,15 @@ void main() {
   beam = params.beams.at[beamIndex];
   walk = params.walks.at[beam.column];
   uint at = 0;
-  bool begins = !kGoOn;
   do {
     at = choose(at);
     uint first = 0;
     do {
-      addPacket(first, begins);
-      if (kPerspective) {
-        addNearLight();
-      }
+      addPacket(first);
+      if (kNearLight) addNearLight();
       storePacket(first);
-      first += kRays * gl_SubgroupSize;
+      first += kRays;
     } while (first < beam.rayCount);
-    begins = false;
     walk.nearCount = 0;
   } while (at < walk.count);
 }
