@@ -70,8 +70,6 @@ layout::LightColumn headerOf(const Column& column, const dvec3& amid) {
 
 layout::LightBeam headerOf(const Beam& beam, const Column& column) {
   layout::LightBeam header{};
-  header.extentScale = beam.extentScale;
-  header.lowU = beam.lowU, header.highU = beam.highU, header.lowV = beam.lowV, header.highV = beam.highV;
   header.turnU = vec3(beam.turn[0][0], beam.turn[0][1], beam.turn[0][2]);
   header.turnV = vec3(beam.turn[1][0], beam.turn[1][1], beam.turn[1][2]);
   header.turnW = vec3(beam.turn[2][0], beam.turn[2][1], beam.turn[2][2]);
@@ -79,6 +77,37 @@ layout::LightBeam headerOf(const Beam& beam, const Column& column) {
   header.depthBase = static_cast<float>(column.depthBase);
   return header;
 }
+
+/// Rectangles of a column's beams, from which the device tells what may touch one.
+struct BeamBoxes {
+  struct Box {
+    vec2 lo, hi;
+  };
+  std::vector<Box> boxes;
+  float extentScale = 1;
+
+  void add(const Beam& beam) {
+    boxes.push_back({{beam.lowU, beam.lowV}, {beam.highU, beam.highV}});
+    extentScale = std::max(extentScale, beam.extentScale);
+  }
+  /// Into the headers of the column and of its beams.
+  void store(layout::LightColumn& column, std::span<layout::LightBeam> beams) const {
+    constexpr float kSteps = 255;
+    vec2 lo = boxes.front().lo, hi = boxes.front().hi;
+    for (const Box& box : boxes) lo = glm::min(lo, box.lo), hi = glm::max(hi, box.hi);
+    const vec2 scale = kSteps / glm::max(hi - lo, vec2(1e-30f));
+    column.boxU = lo.x, column.boxV = lo.y, column.boxScaleU = scale.x, column.boxScaleV = scale.y;
+    column.boxExtent = extentScale;
+    // A step more on each side: the device may round in another way.
+    const auto step = [&](float x, float slack) {
+      return static_cast<layout::uint>(std::clamp(x + slack, 0.0f, kSteps));
+    };
+    for (std::size_t b = 0; b < boxes.size(); ++b) {
+      const vec2 low = (boxes[b].lo - lo) * scale, high = (boxes[b].hi - lo) * scale;
+      beams[b].box = step(low.x, -1) | step(low.y, -1) << 8 | step(high.x, 1) << 16 | step(high.y, 1) << 24;
+    }
+  }
+};
 
 layout::LightRay rayOf(const BeamRays& rays, std::size_t k) {
   return {rays.u[k], rays.v[k], rays.depth[k], rays.self[k], rays.uLow[k], rays.vLow[k], rays.depthLow[k]};
@@ -115,27 +144,38 @@ std::uint64_t LightPass::Buffers::bytes() const {
 LightPass::LightPass(const Device& device, layout::uint falloff, layout::uint endpoint)
     : device_(device), queries_(device.createTimestampQueries(2)), falloff_(falloff), endpoint_(endpoint) {}
 
-const LightPass::Pipelines& LightPass::pipelines(const Variant& variant) {
-  Pipelines& made = pipelines_[variant];
-  if (made.sum.handle() != VK_NULL_HANDLE) return made;
+std::vector<SpecializationConstant> LightPass::constants(bool perspective, bool careful) const {
   const Tuning t = tuning(device_);
-  std::vector<SpecializationConstant> constants{{0, t.groupSize},
-                                                {1, static_cast<std::uint32_t>(tree_->channels())},
-                                                {2, variant.perspective},
-                                                {3, variant.careful},
-                                                {4, t.foundCapacity},
-                                                {5, t.chosenCapacity},
-                                                {6, device_.mostSubgroupSize()}};
-  made.gather = device_.createComputePipeline(variant.exact ? spirv::light_gather_exact_comp : spirv::light_gather_comp,
-                                              sizeof(layout::LightParams), constants);
-  constants.insert(constants.end(), {{7, t.groupRays}, {8, t.groups}, {9, falloff_}, {10, endpoint_}, {11, variant.perspective}});
-  made.sum = device_.createComputePipeline(spirv::light_sum_comp, sizeof(layout::LightParams), constants);
+  return {{0, t.groupSize},      {1, static_cast<std::uint32_t>(tree_->channels())},
+          {2, perspective},      {3, careful},
+          {4, t.foundCapacity},  {5, t.chosenCapacity},
+          {6, device_.mostSubgroupSize()}};
+}
+
+const ComputePipeline& LightPass::gather(const GatherVariant& variant) {
+  ComputePipeline& made = gathers_[variant];
+  if (made.handle() == VK_NULL_HANDLE)
+    made = device_.createComputePipeline(variant.exact ? spirv::light_gather_exact_comp : spirv::light_gather_comp,
+                                         sizeof(layout::LightParams),
+                                         constants(variant.perspective, variant.careful));
+  return made;
+}
+
+const ComputePipeline& LightPass::sum(const SumVariant& variant) {
+  ComputePipeline& made = sums_[variant];
+  if (made.handle() != VK_NULL_HANDLE) return made;
+  const Tuning t = tuning(device_);
+  std::vector<SpecializationConstant> all = constants(variant.perspective, variant.careful);
+  all.insert(all.end(),
+             {{7, t.groupRays}, {8, t.groups}, {9, falloff_}, {10, endpoint_}, {11, variant.nearLight}});
+  made = device_.createComputePipeline(spirv::light_sum_comp, sizeof(layout::LightParams), all);
   return made;
 }
 
 void LightPass::setTree(const Octree& tree) {
   tree_ = &tree;
-  pipelines_.clear();
+  greatestRadius_ = tree.radius.empty() ? 0 : *std::max_element(tree.radius.begin(), tree.radius.end());
+  gathers_.clear(), sums_.clear();
   const std::size_t count = tree.particleCount();
   nodes_ = device_.createBufferWith<layout::Node>(tree.nodes);
   peaks_ = device_.createBuffer(tree.channels() * count * sizeof(float));
@@ -180,49 +220,55 @@ std::vector<float> LightPass::opticalDepths(const Receivers& receivers, const la
 LightPass::Piece LightPass::setUp(const Receivers& receivers, const layout::Light& light, const Beams& beams,
                                   std::size_t first, std::size_t last) const {
   const std::size_t firstBeam = beams.column[first], firstRay = beams.start[firstBeam];
+  const std::size_t beamCount = beams.column[last] - firstBeam;
   Piece piece;
   piece.columns.resize(last - first), piece.planes.resize(8 * (last - first));
-  piece.beams.resize(beams.column[last] - firstBeam);
   piece.rays.resize(beams.start[beams.column[last]] - firstRay), piece.receivers.resize(piece.rays.size());
   const Bounds bounds = tree_->bounds();
   const dvec3 amid(bounds.centre());
   const double reach = 0.5 * glm::length(dvec3(bounds.size()));
   const ColumnRules rules = columnRules(*tree_, light, receivers.bounds());
-  std::atomic<bool> careful = false, plain = false, exact = false;
-  const auto setColumn = [&](std::size_t c, bool alwaysCareful) {
+  std::vector<layout::LightBeam> headers(beamCount);
+  std::vector<std::uint8_t> careful(beamCount);
+  std::atomic<bool> exact = false;
+  parallelBlocks(last - first, 1, [&](std::size_t at, std::size_t) {
     static thread_local Column column;
     static thread_local Beam beam;
+    const std::size_t c = first + at;
     column.setRays(receivers, light, beams.ofColumn(c), rules);
-    layout::LightColumn& header = piece.columns[c - first];
+    layout::LightColumn& header = piece.columns[at];
     header = headerOf(column, amid);
     if (column.precise || glm::distance(dvec3(header.middle), amid) + reach > kExactRadii * rules.leastRadius)
       exact = true;
-    for (int k = 0; k < 8; ++k) {
+    for (std::size_t k = 0; k < 8; ++k) {
       const ColumnPlanes& p = column.planes;
-      piece.planes[8 * (c - first) + static_cast<std::size_t>(k)] = vec4(p.x[k], p.y[k], p.z[k], p.offset[k]);
+      piece.planes[8 * at + k] = vec4(p.x[k], p.y[k], p.z[k], p.offset[k]);
     }
-    for (std::size_t b = beams.column[c]; b < beams.column[c + 1]; ++b) {
-      beam.setRays(column, receivers, beams.ofBeam(b), alwaysCareful);
-      (beam.careful ? careful : plain) = true;
-      layout::LightBeam& to = piece.beams[b - firstBeam];
+    BeamBoxes boxes;
+    const std::size_t begin = beams.column[c] - firstBeam, end = beams.column[c + 1] - firstBeam;
+    for (std::size_t b = begin; b < end; ++b) {
+      beam.setRays(column, receivers, beams.ofBeam(firstBeam + b));
+      careful[b] = beam.careful;
+      boxes.add(beam);
+      layout::LightBeam& to = headers[b];
       to = headerOf(beam, column);
-      to.firstRay = static_cast<layout::uint>(beams.start[b] - firstRay);
+      to.firstRay = static_cast<layout::uint>(beams.start[firstBeam + b] - firstRay);
       to.rayCount = static_cast<layout::uint>(beam.rays.receiver.size());
-      to.column = static_cast<layout::uint>(c - first);
+      to.column = static_cast<layout::uint>(at);
       for (std::size_t k = 0; k < to.rayCount; ++k) {
         piece.rays[to.firstRay + k] = rayOf(beam.rays, k);
         piece.receivers[to.firstRay + k] = beam.rays.receiver[k];
       }
     }
-  };
-  const auto setAll = [&](bool alwaysCareful) {
-    parallelBlocks(last - first, 1, [&](std::size_t c, std::size_t) { setColumn(first + c, alwaysCareful); });
-  };
-  setAll(false);
-  if (careful && plain) setAll(true);  // one pipeline serves them all
+    boxes.store(header, std::span(headers).subspan(begin, end - begin));
+  });
+  for (std::size_t b = 0; b < beamCount; ++b) (careful[b] ? piece.careful : piece.plain).push_back(headers[b]);
   if (exact && !device_.hasFloat64())
     logVerbose("this device has no shaderFloat64: particles beyond 128 of the smallest radius are lit less exactly");
-  piece.variant = {light.type != layout::kLightDirectional, careful, exact && device_.hasFloat64()};
+  piece.exact = exact && device_.hasFloat64();
+  piece.perspective = light.type != layout::kLightDirectional;
+  const vec3 away = light.position - glm::clamp(light.position, bounds.lo, bounds.hi);
+  piece.nearLight = piece.perspective && glm::length(away) <= 1.001 * kNearLightRadii * greatestRadius_;
   return piece;
 }
 
@@ -231,22 +277,21 @@ std::vector<float> LightPass::run(const Piece& piece, float limit) {
   const auto grow = [&](Buffer& buffer, std::size_t bytes) {
     if (buffer.size() < bytes) buffer = device_.createBuffer(std::bit_ceil(bytes));
   };
-  const std::size_t columns = piece.columns.size(), beams = piece.beams.size(), rays = piece.rays.size();
+  const std::size_t columns = piece.columns.size(), beams = piece.plain.size() + piece.careful.size(), rays = piece.rays.size();
   const std::size_t channels = tree_->channels();
   Buffers& to = buffers_;
   grow(to.columns, columns * sizeof(layout::LightColumn)), grow(to.planes, 8 * columns * sizeof(vec4));
   grow(to.walks, columns * sizeof(layout::LightWalk)), grow(to.beams, beams * sizeof(layout::LightBeam));
   grow(to.rays, rays * sizeof(layout::LightRay)), grow(to.depths, channels * rays * sizeof(float));
   grow(to.found, columns * layout::kFoundLists * t.foundCapacity * sizeof(vec4));
-  grow(to.order, columns * (t.foundCapacity + layout::kLightBins * device_.mostSubgroupSize()) * sizeof(layout::uint));
+  grow(to.order, columns * (layout::kOrderLists * t.foundCapacity + layout::kLightBins * device_.mostSubgroupSize()) * sizeof(layout::uint));
   grow(to.chosen, beams * layout::kChosenLists * t.chosenCapacity * sizeof(vec4));
-  grow(to.chosenIndex, beams * t.chosenCapacity * sizeof(layout::uint));
+  grow(to.chosenIndex, beams * layout::kChosenLists * t.chosenCapacity * sizeof(layout::uint));
   deviceBytes_ = std::max(deviceBytes_, nodes_.size() + particles_.size() + peaks_.size() + to.bytes());
   device_.upload<layout::LightColumn>(to.columns, piece.columns);
   device_.upload<vec4>(to.planes, piece.planes);
   device_.upload<layout::LightRay>(to.rays, piece.rays);
-  std::vector<layout::LightWalk> walks(columns);
-  device_.upload<layout::LightWalk>(to.walks, walks);
+  device_.upload<layout::LightWalk>(to.walks, std::vector<layout::LightWalk>(columns));
   device_.upload<float>(to.depths, std::vector<float>(channels * rays, 0.0f));
 
   layout::LightParams params{};
@@ -261,34 +306,39 @@ std::vector<float> LightPass::run(const Piece& piece, float limit) {
   params.opticalDepthLimit = limit;
   params.slotCount = static_cast<layout::uint>(tree_->particleCount());
 
-  const Pipelines& with = pipelines(piece.variant);
+  const ComputePipeline& gathering = gather({piece.perspective, !piece.careful.empty(), piece.exact});
   // A subgroup may be as large as the device likes: enough workgroups for the largest, those beyond the last end.
   const std::size_t eachGroup = t.groupSize / device_.mostSubgroupSize();
-  std::vector<layout::LightBeam> todo = piece.beams;
-  while (!todo.empty()) {
-    device_.upload<layout::LightBeam>(to.beams, todo);
-    params.beamCount = static_cast<layout::uint>(todo.size());
+  std::vector<layout::LightBeam> plain = piece.plain, careful = piece.careful;
+  while (!plain.empty() || !careful.empty()) {
     queries_.reset();
+    device_.upload<layout::LightBeam>(to.beams, plain);
+    device_.upload<layout::LightBeam>(to.beams, careful, plain.size());
     device_.run([&](CommandBuffer& commands) {
-      const std::uint32_t gather = queries_.begin(commands, "gather");
-      commands.dispatchRow(with.gather, params, (columns + eachGroup - 1) / eachGroup);
-      queries_.end(commands, gather);
+      const std::uint32_t stage = queries_.begin(commands, "light");
+      commands.dispatchRow(gathering, params, (columns + eachGroup - 1) / eachGroup);
       commands.barrier(barrier::computeToCompute);
-      const std::uint32_t sum = queries_.begin(commands, "sum");
-      commands.dispatchRow(with.sum, params, (todo.size() + eachGroup - 1) / eachGroup);
-      queries_.end(commands, sum);
+      const auto addUp = [&](std::size_t first, std::size_t count, bool areCareful) {
+        if (count == 0) return;
+        layout::LightParams own = params;
+        own.beams += first * sizeof(layout::LightBeam), own.beamCount = static_cast<layout::uint>(count);
+        own.chosen += first * layout::kChosenLists * t.chosenCapacity * sizeof(vec4);
+        own.chosenIndex += first * layout::kChosenLists * t.chosenCapacity * sizeof(layout::uint);
+        commands.dispatchRow(sum({piece.perspective, areCareful, piece.nearLight}), own,
+                             (count + eachGroup - 1) / eachGroup);
+      };
+      addUp(0, plain.size(), false);
+      addUp(plain.size(), careful.size(), true);
+      queries_.end(commands, stage);
     });
-    for (const StageTime& stage : queries_.results()) {
-      deviceSeconds_ += stage.seconds;
-      if (std::getenv("SHOW")) std::fprintf(stderr, "%s %.1f ms  ", stage.stage.c_str(), stage.seconds * 1e3);
-    }
-    if (std::getenv("SHOW")) std::fprintf(stderr, "%zu columns %zu beams %zu rays\n", columns, todo.size(), rays);
+    for (const StageTime& stage : queries_.results()) deviceSeconds_ += stage.seconds;
     // Beams of columns whose walk has not come to its end go on.
-    walks = device_.download<layout::LightWalk>(to.walks, columns);
-    std::erase_if(todo, [&](const layout::LightBeam& beam) {
-      const layout::LightWalk& walk = walks[beam.column];
+    const auto walked = device_.download<layout::LightWalk>(to.walks, columns);
+    const auto finished = [&](const layout::LightBeam& beam) {
+      const layout::LightWalk& walk = walked[beam.column];
       return walk.slot >= walk.end && walk.node >= params.nodeCount;
-    });
+    };
+    std::erase_if(plain, finished), std::erase_if(careful, finished);
   }
   return device_.download<float>(to.depths, channels * rays);
 }

@@ -45,22 +45,23 @@ class LightPass {
   std::uint64_t deviceBytes() const { return deviceBytes_; }
 
  private:
-  /// What a piece's shaders are compiled for.
-  struct Variant {
+  /// What shaders are compiled for, beside the pass and the tree. `careful`: of any beam (gather), of the beam (sum).
+  struct GatherVariant {
     bool perspective, careful, exact;
-    auto operator<=>(const Variant&) const = default;
+    auto operator<=>(const GatherVariant&) const = default;
   };
-  struct Pipelines {
-    ComputePipeline gather, sum;
+  struct SumVariant {
+    bool perspective, careful, nearLight;
+    auto operator<=>(const SumVariant&) const = default;
   };
   /// Columns that are computed together: what the host has set up, and where it is on the device.
   struct Piece {
     std::vector<layout::LightColumn> columns;
     std::vector<layout::vec4> planes;
-    std::vector<layout::LightBeam> beams;
+    std::vector<layout::LightBeam> plain, careful;
     std::vector<layout::LightRay> rays;
     std::vector<std::uint32_t> receivers;  ///< of the rays
-    Variant variant;
+    bool perspective, exact, nearLight;
   };
   struct Buffers {
     Buffer columns, planes, walks, beams, rays, depths, found, order, chosen, chosenIndex;
@@ -69,7 +70,9 @@ class LightPass {
   struct Tuning;
   static Tuning tuning(const Device& device);
 
-  const Pipelines& pipelines(const Variant& variant);
+  std::vector<SpecializationConstant> constants(bool perspective, bool careful) const;
+  const ComputePipeline& gather(const GatherVariant& variant);
+  const ComputePipeline& sum(const SumVariant& variant);
   Piece setUp(const Receivers& receivers, const layout::Light& light, const Beams& beams, std::size_t first,
               std::size_t last) const;
   std::vector<float> run(const Piece& piece, float limit);
@@ -78,7 +81,9 @@ class LightPass {
   TimestampQueries queries_;
   layout::uint falloff_, endpoint_;
   const Octree* tree_ = nullptr;
-  std::map<Variant, Pipelines> pipelines_;
+  float greatestRadius_ = 0;
+  std::map<GatherVariant, ComputePipeline> gathers_;
+  std::map<SumVariant, ComputePipeline> sums_;
   Buffer nodes_, particles_, peaks_;
   Buffers buffers_;
   double deviceSeconds_ = 0;

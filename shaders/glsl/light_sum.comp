@@ -39,48 +39,57 @@ uint raySelf[kRays];
 // … and what the lane's particles add to each.
 float sum[kRays], sumGreen[kRays], sumBlue[kRays];
 
-/// The particles from `at` (in `order`) on that may touch the beam, until the list is full; returns where to go on.
+bool touches(uint box) {
+  const uvec4 own = uvec4(box, box >> 8, box >> 16, box >> 24) & 0xffu;
+  const uvec4 beams = uvec4(beam.box, beam.box >> 8, beam.box >> 16, beam.box >> 24) & 0xffu;
+  return own.x <= beams.z && own.y <= beams.w && own.z >= beams.x && own.w >= beams.y;
+}
+
+/// The particles from `at` (in the column's order) on that may touch the beam, until the list is full; returns where to
+/// go on. Those are few, so what they are is looked up only when all are known.
 uint choose(uint at) {
   const uint lane = gl_SubgroupInvocationID, width = gl_SubgroupSize;
-  const uint places = foundList(beam.column, 0), peaks = foundList(beam.column, 2), order = orderList(beam.column);
-  const uint to = chosenList(beamIndex, 0), colours = chosenList(beamIndex, 1), indices = beamIndex * kChosenCapacity;
+  const uint boxes = orderList(beam.column, 2), order = orderList(beam.column, 0);
+  const uint inOrder = chosenList(beamIndex, 0), inLists = chosenList(beamIndex, 1);
   chosenCount = 0;
-  while (at < walk.count && chosenCount + 2 * width <= kChosenCapacity) {
-    const uint from = params.order.at[order + min(at + lane, walk.count - 1)];
-    const vec4 p = params.found.at[places + from];
-    const float extent = p.z * beam.extentScale;
-    const bool touches = at + lane < walk.count && p.x - extent <= beam.highU && p.x + extent >= beam.lowU &&
-                         p.y - extent <= beam.highV && p.y + extent >= beam.lowV;
-    const uvec4 chosen = subgroupBallot(touches);
-    const uint place = chosenCount + subgroupBallotExclusiveBitCount(chosen);
-    chosenCount += subgroupBallotBitCount(chosen);
-    if (touches) {
-      const vec3 uv1 = vec3(p.xy, 1.0);
-      const float w = dot(beam.turnW, uv1);
-      const vec4 peak = params.found.at[peaks + from];
-      params.chosen.at[to + place] = vec4(dot(beam.turnU, uv1) / w, dot(beam.turnV, uv1) / w, p.w * (w * w), peak.x);
-      if (kChannels == 3) params.chosen.at[colours + place] = peak;
-      params.chosenIndex.at[indices + place] = from;
-    }
+  do {
+    const bool chosen = at + lane < walk.count && touches(params.order.at[boxes + min(at + lane, kFoundCapacity - 1)]);
+    const uvec4 all = subgroupBallot(chosen);
+    if (chosen) params.chosenIndex.at[inOrder + chosenCount + subgroupBallotExclusiveBitCount(all)] = at + lane;
+    chosenCount += subgroupBallotBitCount(all);
     at += width;
-  }
-  // The last block is filled up with nothing.
-  params.chosen.at[to + chosenCount + lane] = vec4(0);
-  if (kChannels == 3) params.chosen.at[colours + chosenCount + lane] = vec4(0);
-  params.chosenIndex.at[indices + chosenCount + lane] = 0;
+  } while (at < walk.count && chosenCount + 2 * width <= kChosenCapacity);
+  shareWrites();
+  uint block = 0;
+  do {  // the last block is filled up with nothing
+    const uint place = block + lane;
+    const bool own = place < chosenCount;
+    const uint from = own ? params.order.at[order + params.chosenIndex.at[inOrder + place]] : 0;
+    const vec4 p = params.found.at[foundList(beam.column, 0) + from];
+    const vec3 uv1 = vec3(p.xy, 1.0);
+    const float w = dot(beam.turnW, uv1);
+    const vec4 turned = vec4(dot(beam.turnU, uv1) / w, dot(beam.turnV, uv1) / w, p.z * (w * w), p.w);
+    params.chosen.at[chosenList(beamIndex, 0) + place] = own ? turned : vec4(0);
+    if (kCareful || kChannels == 3) {
+      const vec4 others = params.found.at[foundList(beam.column, 2) + from];
+      params.chosen.at[chosenList(beamIndex, 1) + place] = own ? others : vec4(0);
+    }
+    params.chosenIndex.at[inLists + place] = from;
+    block += width;
+  } while (block < chosenCount);
   shareWrites();
   return at;
 }
 
 /// The first chosen particle whose reach is in this bin or a later one; each lane for its own.
 uint firstFrom(uint bin) {
-  const uint indices = beamIndex * kChosenCapacity, ends = foundList(beam.column, 1);
+  const uint inOrder = chosenList(beamIndex, 0), width = gl_SubgroupSize;
+  uint behind = params.order.at[binCounters(beam.column) + max(bin, 1) * width - 1];
+  if (bin == 0) behind = 0;
   uint low = 0, high = chosenCount;
   while (subgroupAny(low < high)) {
     const uint middle = (low + high) / 2;
-    const uint found = binOf(params.found.at[ends + params.chosenIndex.at[indices + middle]].z, walk);
-    const bool before = found < bin;
-    const bool open = low < high;
+    const bool before = params.chosenIndex.at[inOrder + min(middle, kChosenCapacity - 1)] < behind, open = low < high;
     low = open && before ? middle + 1 : low;
     high = open && !before ? middle : high;
   }
@@ -100,17 +109,14 @@ void add(uint k, float red, vec2 others, float share) {
   if (kChannels == 3) sumGreen[k] += others.x * share, sumBlue[k] += others.y * share;
 }
 
-/// The lane's particle of a block: place, and what only some variants need.
+/// The lane's particle of a block.
 struct Particle {
   vec4 place;   // u, v, 1/r², peak
-  vec2 others;  // the other peaks
-  vec2 low;
+  vec4 others;  // uLow, vLow, the other peaks
 };
 Particle particleAt(uint at) {
-  Particle p = Particle(params.chosen.at[chosenList(beamIndex, 0) + at], vec2(0), vec2(0));
-  if (kChannels == 3) p.others = params.chosen.at[chosenList(beamIndex, 1) + at].yz;
-  if (kCareful)
-    p.low = params.found.at[foundList(beam.column, 3) + params.chosenIndex.at[beamIndex * kChosenCapacity + at]].xy;
+  Particle p = Particle(params.chosen.at[chosenList(beamIndex, 0) + at], vec4(0));
+  if (kCareful || kChannels == 3) p.others = params.chosen.at[chosenList(beamIndex, 1) + at];
   return p;
 }
 
@@ -120,7 +126,7 @@ void addBefore(uint block, const uint group) {
   [[unroll]] for (uint g = group; g < kGroups; ++g) {
     [[unroll]] for (uint j = 0; j < kGroupRays; ++j) {
       const uint k = g * kGroupRays + j;
-      add(k, p.place.w, p.others, falloff(separation(p.place, p.low, k), kFalloff));
+      add(k, p.place.w, p.others.zw, falloff(separation(p.place, p.others.xy, k), kFalloff));
     }
   }
 }
@@ -137,17 +143,16 @@ float softShare(float q, float t, float radius, float inverseRadius) {
 void addAtStart(uint block, const uint group) {
   const uint at = block + gl_SubgroupInvocationID;
   const Particle p = particleAt(at);
-  const uint from = params.chosenIndex.at[beamIndex * kChosenCapacity + at];
+  const uint from = params.chosenIndex.at[chosenList(beamIndex, 1) + at];
   const vec4 end = params.found.at[foundList(beam.column, 1) + from];
-  const float depthLow = params.found.at[foundList(beam.column, 2) + from].w;
   const float radius = end.y, inverseRadius = 1.0 / radius, area = radius * radius;
   const float inverseDepth = kPerspective ? 1.0 / (end.x + beam.depthBase) : 0.0;
   const float sagFirst = 0.5 * inverseDepth, sagRatio = 0.25 * (inverseDepth * inverseDepth);
   const float inverseArea = min(inverseRadius * inverseRadius, kGreatestInverseArea);
   [[unroll]] for (uint j = 0; j < kGroupRays; ++j) {
     const uint k = group * kGroupRays + j;
-    const float q = separation(p.place, p.low, k);
-    float t = (rayDepth[k] - end.x) + (rayDepthLow[k] - depthLow);
+    const float q = separation(p.place, p.others.xy, k);
+    float t = (rayDepth[k] - end.x) + (rayDepthLow[k] - end.z);
     if (kPerspective) {
       const float b2 = q * area;
       t += b2 * sagFirst * (1.0 + b2 * sagRatio);
@@ -159,7 +164,7 @@ void addAtStart(uint block, const uint group) {
     } else {
       share = softShare(q, t, radius, inverseRadius);
     }
-    add(k, p.place.w, p.others, raySelf[k] == floatBitsToUint(end.w) ? 0.0 : share);
+    add(k, p.place.w, p.others.zw, raySelf[k] == floatBitsToUint(end.w) ? 0.0 : share);
   }
 }
 
@@ -169,8 +174,9 @@ void addNearLight() {
   do {
     const uint at = kFoundCapacity - 1 - min(near, max(walk.nearCount, 1) - 1);
     const vec4 p = params.found.at[foundList(beam.column, 0) + at], end = params.found.at[foundList(beam.column, 1) + at];
-    vec4 peak = params.found.at[foundList(beam.column, 2) + at];
-    if (near >= walk.nearCount) peak = vec4(0);
+    vec3 peak = vec3(end.x, 0, 0);
+    if (kChannels == 3) peak.yz = params.found.at[foundList(beam.column, 2) + at].zw;
+    if (near >= walk.nearCount) peak = vec3(0);
     [[unroll]] for (uint g = 0; g < kGroups; ++g) {
       [[unroll]] for (uint j = 0; j < kGroupRays; ++j) {
         const uint k = g * kGroupRays + j;

@@ -51,6 +51,11 @@ struct LightColumn {
   float middleVLow;
   vec3 axisLow;
   float middleZLow;
+  float boxU;             // the beams' rectangle, in steps of a 255th: its corner, …
+  float boxV;
+  float boxScaleU;        // … steps a unit …
+  float boxScaleV;
+  float boxExtent;        // … and the factor on a particle's extents with which it covers all that it may touch
 };
 MOTE_BUFFER(LightColumnBuffer, LightColumn)
 MOTE_ASSERT_OFFSET(LightColumn, planeOrigin, 0);
@@ -69,7 +74,12 @@ MOTE_ASSERT_OFFSET(LightColumn, vLow, 96);
 MOTE_ASSERT_OFFSET(LightColumn, middleVLow, 108);
 MOTE_ASSERT_OFFSET(LightColumn, axisLow, 112);
 MOTE_ASSERT_OFFSET(LightColumn, middleZLow, 124);
-MOTE_ASSERT_SIZE(LightColumn, 128);
+MOTE_ASSERT_OFFSET(LightColumn, boxU, 128);
+MOTE_ASSERT_OFFSET(LightColumn, boxV, 132);
+MOTE_ASSERT_OFFSET(LightColumn, boxScaleU, 136);
+MOTE_ASSERT_OFFSET(LightColumn, boxScaleV, 140);
+MOTE_ASSERT_OFFSET(LightColumn, boxExtent, 144);
+MOTE_ASSERT_SIZE(LightColumn, 148);
 
 // How far the walk for a column has come, and what it has found since light_sum.comp last added up. All zero: nothing.
 struct LightWalk {
@@ -98,11 +108,7 @@ struct LightBeam {
   uint firstRay;          // of the dispatch
   uint rayCount;
   uint column;            // of the dispatch
-  float extentScale;      // with the rectangle: what may touch the beam, in the column's frame
-  float lowU;
-  float highU;
-  float lowV;
-  float highV;
+  uint box;               // its rectangle in the column's steps: low u, low v, high u, high v, a byte each
   vec3 turnU;             // rows: from the column's frame (u, v, 1) into the beam's
   float margin;           // rounding of depths [scene units]
   vec3 turnV;
@@ -113,17 +119,13 @@ MOTE_BUFFER(LightBeamBuffer, LightBeam)
 MOTE_ASSERT_OFFSET(LightBeam, firstRay, 0);
 MOTE_ASSERT_OFFSET(LightBeam, rayCount, 4);
 MOTE_ASSERT_OFFSET(LightBeam, column, 8);
-MOTE_ASSERT_OFFSET(LightBeam, extentScale, 12);
-MOTE_ASSERT_OFFSET(LightBeam, lowU, 16);
-MOTE_ASSERT_OFFSET(LightBeam, highU, 20);
-MOTE_ASSERT_OFFSET(LightBeam, lowV, 24);
-MOTE_ASSERT_OFFSET(LightBeam, highV, 28);
-MOTE_ASSERT_OFFSET(LightBeam, turnU, 32);
-MOTE_ASSERT_OFFSET(LightBeam, margin, 44);
-MOTE_ASSERT_OFFSET(LightBeam, turnV, 48);
-MOTE_ASSERT_OFFSET(LightBeam, depthBase, 60);
-MOTE_ASSERT_OFFSET(LightBeam, turnW, 64);
-MOTE_ASSERT_SIZE(LightBeam, 76);
+MOTE_ASSERT_OFFSET(LightBeam, box, 12);
+MOTE_ASSERT_OFFSET(LightBeam, turnU, 16);
+MOTE_ASSERT_OFFSET(LightBeam, margin, 28);
+MOTE_ASSERT_OFFSET(LightBeam, turnV, 32);
+MOTE_ASSERT_OFFSET(LightBeam, depthBase, 44);
+MOTE_ASSERT_OFFSET(LightBeam, turnW, 48);
+MOTE_ASSERT_SIZE(LightBeam, 60);
 
 // One ray of a beam; a beam's rays stand by ascending depth.
 struct LightRay {
@@ -145,11 +147,14 @@ MOTE_ASSERT_OFFSET(LightRay, vLow, 20);
 MOTE_ASSERT_OFFSET(LightRay, depthLow, 24);
 MOTE_ASSERT_SIZE(LightRay, 28);
 
-// Scratch lists, `capacity` long: for each column kFoundLists of vec4 and `order`, for each beam kChosenLists of vec4 and
-// an index.
-MOTE_CONST uint kFoundLists = 4u;   // u, v, extent, 1/r² · depth, radius, reach, slot · peaks, depthLow · uLow, vLow
-MOTE_CONST uint kChosenLists = 2u;  // u, v, 1/r², peak · the other peaks
-MOTE_CONST uint kLightBins = 128u;  // what is found for a column is put in so many bins by its reach
+// Scratch lists, `capacity` long. Of a column, as vec4: u, v, 1/r², peak · depth, radius, depthLow, slot · uLow, vLow,
+// green peak, blue peak (careful or in colour). As uint: the order by reach · boxes (as LightBeam::box) as they were found ·
+// boxes by reach; then counters of the bins.
+MOTE_CONST uint kFoundLists = 3u;
+MOTE_CONST uint kOrderLists = 3u;
+MOTE_CONST uint kLightBins = 128u;
+// Of a beam, as vec4: u, v, 1/r², peak · as the column's third. As uint: place in the column's order · place in its lists.
+MOTE_CONST uint kChosenLists = 2u;
 
 // One dispatch of light_gather.comp or light_sum.comp: columns [0, columnCount) and beams [0, beamCount).
 struct LightParams {
@@ -163,9 +168,9 @@ struct LightParams {
   MOTE_ADDRESS(LightRayBuffer) rays;
   MOTE_ADDRESS(FloatBuffer) opticalDepths;  // in and out, [channel][ray]: Σ τ before shadowDensity
   MOTE_ADDRESS(Vec4Buffer) found;           // scratch, [column][kFoundLists][capacity]
-  MOTE_ADDRESS(UintBuffer) order;           // scratch, [column]: [capacity] by reach, [kLightBins][widest subgroup]
+  MOTE_ADDRESS(UintBuffer) order;           // scratch, [column]: [kOrderLists][capacity], [kLightBins][widest subgroup]
   MOTE_ADDRESS(Vec4Buffer) chosen;          // scratch, [beam][kChosenLists][capacity]
-  MOTE_ADDRESS(UintBuffer) chosenIndex;     // scratch, [beam][capacity]: where in `found`
+  MOTE_ADDRESS(UintBuffer) chosenIndex;     // scratch, [beam][kChosenLists][capacity]
   uint nodeCount;
   uint columnCount;
   uint beamCount;

@@ -33,15 +33,18 @@ const float kFarOff = 3e38;
 
 float lowPart(Real value) { return float(value - Real(float(value))); }
 
-/// By ascending bin of their reach, into `order`. Each lane counts its own, so nothing is atomic and the order is the
-/// same every time.
+/// By ascending bin of their reach, into the lists of the order. Each lane counts its own, so nothing is atomic and the
+/// order is the same every time. Counters end as the places behind their bins' last.
 void sortByReach(uint column, LightWalk walk) {
   const uint lane = gl_SubgroupInvocationID, width = gl_SubgroupSize;
-  const uint order = orderList(column), bins = order + kFoundCapacity, places = foundList(column, 1);
+  const uint order = orderList(column, 0), boxes = orderList(column, 1), sortedBoxes = orderList(column, 2),
+             bins = binCounters(column), ends = foundList(column, 1);
   for (uint bin = 0; bin < kLightBins; ++bin) params.order.at[bins + bin * width + lane] = 0;
   for (uint at = 0; at < walk.count; at += width)
-    if (at + lane < walk.count)
-      ++params.order.at[bins + binOf(params.found.at[places + at + lane].z, walk) * width + lane];
+    if (at + lane < walk.count) {
+      const vec2 end = params.found.at[ends + at + lane].xy;
+      ++params.order.at[bins + binOf(end.x + end.y, walk) * width + lane];
+    }
   uint before = 0;
   for (uint bin = 0; bin < kLightBins; ++bin) {
     const uint count = params.order.at[bins + bin * width + lane];
@@ -51,9 +54,21 @@ void sortByReach(uint column, LightWalk walk) {
   }
   for (uint at = 0; at < walk.count; at += width)
     if (at + lane < walk.count) {
-      const uint counter = bins + binOf(params.found.at[places + at + lane].z, walk) * width + lane;
-      params.order.at[order + params.order.at[counter]++] = at + lane;
+      const vec2 end = params.found.at[ends + at + lane].xy;
+      const uint counter = bins + binOf(end.x + end.y, walk) * width + lane;
+      const uint place = params.order.at[counter]++;
+      params.order.at[order + place] = at + lane;
+      params.order.at[sortedBoxes + place] = params.order.at[boxes + at + lane];
     }
+}
+
+/// What a particle covers of the beams' rectangle, in its steps.
+uint boxOf(LightColumn column, vec2 place, float extent) {
+  const vec2 reach = vec2(extent * column.boxExtent), scale = vec2(column.boxScaleU, column.boxScaleV);
+  const vec2 offset = place - vec2(column.boxU, column.boxV);
+  const uvec2 low = uvec2(clamp((offset - reach) * scale, 0.0, 255.0));
+  const uvec2 high = uvec2(clamp((offset + reach) * scale, 0.0, 255.0));
+  return low.x | low.y << 8 | high.x << 16 | high.y << 24;
 }
 
 void main() {
@@ -69,8 +84,8 @@ void main() {
   const Real middleU = WHOLE(column.middleU, column.middleULow), middleV = WHOLE(column.middleV, column.middleVLow),
              middleZ = WHOLE(column.middleZ, column.middleZLow);
   const Real shift = Real(column.middleZ - column.depthBase) + Real(column.middleZLow - column.depthBaseLow);
-  const uint places = foundList(index, 0), ends = foundList(index, 1), peaks = foundList(index, 2),
-             lows = foundList(index, 3);
+  const uint places = foundList(index, 0), ends = foundList(index, 1), others = foundList(index, 2),
+             boxes = orderList(index, 1);
 
   LightWalk walk = params.walks.at[index];
   walk.count = walk.nearCount = 0;
@@ -111,21 +126,20 @@ void main() {
         ahead = float(z) > kLeastCosine * float(distance);
       }
       const float inverseArea = min(float(perRadius * perRadius), kGreatestInverseArea);
-      const float reach = float(depth) + radius;
+      const float reach = float(depth) + radius;  // as in sortByReach
       const bool nearLight = inside && near, sorted = inside && !near && ahead;
       const uvec4 ahead4 = subgroupBallot(sorted);
       const uint to = walk.count + subgroupBallotExclusiveBitCount(ahead4);
       walk.count += subgroupBallotBitCount(ahead4);
+      const float peak = params.peaks.at[slot];
+      vec2 colours = vec2(0);
+      if (kChannels == 3)
+        colours = vec2(params.peaks.at[params.slotCount + slot], params.peaks.at[2 * params.slotCount + slot]);
       if (sorted) {
-        params.found.at[places + to] = vec4(float(u), float(v), float(extent), inverseArea);
-        params.found.at[ends + to] = vec4(float(depth), radius, reach, uintBitsToFloat(slot));
-        const float peak = params.peaks.at[slot];
-        if (kChannels == 3)
-          params.found.at[peaks + to] = vec4(peak, params.peaks.at[params.slotCount + slot],
-                                             params.peaks.at[2 * params.slotCount + slot], lowPart(depth));
-        else
-          params.found.at[peaks + to] = vec4(peak, peak, peak, lowPart(depth));
-        if (kCareful) params.found.at[lows + to] = vec4(lowPart(u), lowPart(v), 0, 0);
+        params.found.at[places + to] = vec4(float(u), float(v), inverseArea, peak);
+        params.found.at[ends + to] = vec4(float(depth), radius, lowPart(depth), uintBitsToFloat(slot));
+        if (kCareful || kChannels == 3) params.found.at[others + to] = vec4(lowPart(u), lowPart(v), colours);
+        params.order.at[boxes + to] = boxOf(column, vec2(u, v), float(extent));
         lowest = min(lowest, reach), highest = max(highest, reach), greatest = max(greatest, radius);
       }
       if (kPerspective) {  // those near the light from the end of the list
@@ -135,11 +149,8 @@ void main() {
         if (nearLight) {
           params.found.at[places + place] =
               vec4(float(x), float(y), float(z), min(1.0 / (radius * radius), kGreatestInverseArea));
-          params.found.at[ends + place] = vec4(0, radius, 0, uintBitsToFloat(slot));
-          const float peak = params.peaks.at[slot];
-          params.found.at[peaks + place] =
-              vec4(peak, kChannels == 3 ? params.peaks.at[params.slotCount + slot] : peak,
-                   kChannels == 3 ? params.peaks.at[2 * params.slotCount + slot] : peak, 0);
+          params.found.at[ends + place] = vec4(peak, radius, 0, uintBitsToFloat(slot));
+          if (kChannels == 3) params.found.at[others + place] = vec4(0, 0, colours);
         }
       }
       walk.slot += width;

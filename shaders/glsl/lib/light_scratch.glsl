@@ -11,7 +11,7 @@
 layout(local_size_x_id = 0) in;  // a multiple of every subgroup size that the device may choose
 layout(constant_id = 1) const uint kChannels = 1;
 layout(constant_id = 2) const bool kPerspective = false;
-layout(constant_id = 3) const bool kCareful = false;  // Beam::careful
+layout(constant_id = 3) const bool kCareful = false;  // Beam::careful; light_gather.comp: of any beam
 layout(constant_id = 4) const uint kFoundCapacity = 1024;
 layout(constant_id = 5) const uint kChosenCapacity = 1024;
 layout(constant_id = 6) const uint kWidestSubgroup = 64;
@@ -31,7 +31,10 @@ void shareWrites() {
 
 uint foundList(uint column, uint list) { return (column * kFoundLists + list) * kFoundCapacity; }
 uint chosenList(uint beam, uint list) { return (beam * kChosenLists + list) * kChosenCapacity; }
-uint orderList(uint column) { return column * (kFoundCapacity + kLightBins * kWidestSubgroup); }
+uint orderList(uint column, uint list) {
+  return column * (kOrderLists * kFoundCapacity + kLightBins * kWidestSubgroup) + list * kFoundCapacity;
+}
+uint binCounters(uint column) { return orderList(column, kOrderLists); }  // [bin][lane]
 
 /// Never decreases with the reach, which is all that is asked of it.
 uint binOf(float reach, LightWalk walk) {
