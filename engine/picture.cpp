@@ -25,8 +25,8 @@ using SurfaceRadiance = std::vector<vec3>;
 
 class Composer {
  public:
-  Composer(const Scene& scene, const SplatSet& set, const Surfaces& surfaces, Rasterizer& rasterizer, FrameStats& stats)
-      : scene_(scene), set_(set), surfaces_(surfaces), rasterizer_(rasterizer), stats_(stats) {
+  Composer(const Scene& scene, const Surfaces& surfaces, Rasterizer& rasterizer, FrameStats& stats)
+      : scene_(scene), surfaces_(surfaces), rasterizer_(rasterizer), stats_(stats) {
     if (!surfaces.empty())
       for (int k = 0; k < surfaces.drawings(); ++k) depths_.push_back(surfaces.depths(k));
   }
@@ -73,13 +73,12 @@ class Composer {
     if (!sum.opticalDepth.empty()) sum.opticalDepth[p] += coverage * drawn.opticalDepth[p];
     if (!sum.depth.empty()) sum.depth[p] = std::min({sum.depth[p], drawn.depth[p], shaded ? surface->depth : kNoDepth});
     if (!sum.velocity.empty()) {
-      const vec2 own = shaded ? screenVelocity(surface->points[0], vec3(0), set_.scene) : vec2(0);
+      const vec2 own = shaded ? screenVelocity(surface->points[0], vec3(0), rasterizer_.set().scene) : vec2(0);
       sum.velocity[p] += coverage * (medium.w * drawn.velocity[p] + behind * own);
     }
   }
 
   const Scene& scene_;
-  const SplatSet& set_;
   const Surfaces& surfaces_;
   Rasterizer& rasterizer_;
   FrameStats& stats_;
@@ -108,8 +107,8 @@ ImageLayer shadowLayer(const std::string& light, const Surfaces& surfaces, const
 
 }  // namespace
 
-Image makePicture(const Frame& frame, const Scene& scene, const SplatSet& set, LitParticles lit,
-                  const Surfaces& surfaces, Rasterizer& rasterizer, const ShadowSources& sources, FrameStats& stats) {
+Image makePicture(const Frame& frame, const Scene& scene, LitParticles lit, const Surfaces& surfaces,
+                  Rasterizer& rasterizer, const ShadowSources& sources, FrameStats& stats) {
   std::vector<ImageLayer> shadows;
   std::vector<SurfaceRadiance> byLight;
   SurfaceRadiance total(surfaces.all.size(), vec3(0));
@@ -124,18 +123,19 @@ Image makePicture(const Frame& frame, const Scene& scene, const SplatSet& set, L
     byLight.push_back(std::move(own.radiance));
   }
   if (!surfaces.empty()) stats.seconds["lighting"] += timer.lap();
-  Composer composer(scene, set, surfaces, rasterizer, stats);
+  Composer composer(scene, surfaces, rasterizer, stats);
   Image picture = composer.compose(total, layersOf(frame, scene.output));
   picture.layers = std::move(shadows);
   if (!scene.output.lights) return picture;
   const SplatLayers plain{.colorAlpha = !frame.extinction.grey() && !surfaces.empty()};
-  const bool emits = !set.emission.empty();
+  const bool emits = !rasterizer.set().emission.empty();
   if (emits) {  // first, since the others take the emission away
-    rasterizer.relight(relit(set, frame, scene, std::vector<vec3>(set.particles.size(), vec3(0))), true);
+    rasterizer.relight(relit(rasterizer.set(), frame, scene, std::vector<vec3>(frame.density.source().size(), vec3(0))),
+                       true);
     addColorLayers(composer.compose(SurfaceRadiance(total.size(), vec3(0)), plain), "emission", picture);
   }
   for (std::size_t l = 0; l < frame.lights.size(); ++l) {
-    rasterizer.relight(relit(set, frame, scene, lit.byLight[l]), false);
+    rasterizer.relight(relit(rasterizer.set(), frame, scene, lit.byLight[l]), false);
     lit.byLight[l] = {};
     addColorLayers(composer.compose(byLight[l], plain), "light." + frame.lightNames[l], picture);
   }

@@ -21,7 +21,7 @@ namespace mote {
 ///   picture
 /// `lit` is taken apart on the way. `sources` light the surfaces. The seconds of that go to stats' "lighting", those of
 /// laying surfaces and medium over each other to "solids"; the rasteriser counts its own.
-Image makePicture(const Frame& frame, const Scene& scene, const SplatSet& set, LitParticles lit,
-                  const Surfaces& surfaces, Rasterizer& rasterizer, const ShadowSources& sources, FrameStats& stats);
+Image makePicture(const Frame& frame, const Scene& scene, LitParticles lit, const Surfaces& surfaces,
+                  Rasterizer& rasterizer, const ShadowSources& sources, FrameStats& stats);
 
 }  // namespace mote

@@ -41,6 +41,7 @@ class HostRasterizer : public Rasterizer {
     if (!emission) set_.emission.clear();
   }
 
+  const SplatSet& set() const override { return set_; }
   const std::vector<layout::uint>& order() const override { return order_; }
 
  private:
@@ -95,6 +96,8 @@ class DeviceRasterizer : public Rasterizer {
     if (!emission) set_.emission.clear();
     if (full_) full_->drawEmission(emission);
   }
+
+  const SplatSet& set() const override { return set_; }
 
   const std::vector<layout::uint>& order() const override {
     if (order_.empty()) order_ = device_.download<layout::uint>(indices_, count_);

@@ -20,6 +20,8 @@ class Rasterizer {
   virtual Image draw(std::span<const float> surfaces, SplatLayers layers) = 0;
   /// Other radiance for the same particles; `emission` false: theirs is not drawn.
   virtual void relight(std::vector<layout::SplatParticle> particles, bool emission) = 0;
+  /// What is drawn, as it was lit last.
+  virtual const SplatSet& set() const = 0;
   /// The particles from back to front.
   virtual const std::vector<layout::uint>& order() const = 0;
 };

@@ -116,14 +116,17 @@ Image Renderer::draw(const Frame& frame, const Scene& scene, LitParticles lit, F
     stats.seconds["lighting"] += timer.lap();
   }
 
+  timer.lap();
   SplatSet set = splatSet(frame, scene, lit.radiance);
   lit.radiance = {};
+  stats.drawn = set.particles.size();
+  stats.seconds["splat"] += timer.lap();
   const float keyScale = depthKeyScale(frame.particles.bounds(), frame.view.position);
   const std::unique_ptr<Rasterizer> rasterizer = backends_.gpuRaster
-                                                     ? deviceRasterizer(gpu_->device(), set, keyScale, stats)
-                                                     : hostRasterizer(set, keyScale, stats);
+                                                     ? deviceRasterizer(gpu_->device(), std::move(set), keyScale, stats)
+                                                     : hostRasterizer(std::move(set), keyScale, stats);
   if (order) *order = rasterizer->order();
-  Image image = makePicture(frame, scene, set, std::move(lit), surfaces, *rasterizer,
+  Image image = makePicture(frame, scene, std::move(lit), surfaces, *rasterizer,
                             device ? device->sources(frame) : hostShadows(frame), stats);
   if (device) device->addTo(stats);
   return image;

@@ -12,6 +12,7 @@
 #include "host/image/png.h"
 #include "host/scene/camera_path.h"
 #include "host/scene/missing_file.h"
+#include "host/splat/full_footprint.h"
 #include "host/splat/splat.h"
 
 namespace mote {
@@ -72,14 +73,43 @@ vec3 albedoOf(const ParticleSet& particles, const Medium& medium, std::size_t i)
   return singleScatteringAlbedo(medium.albedo * own, particles.absorption.empty() ? nullptr : &particles.absorption[i]);
 }
 
-/// One of a set's arrays: get(i) for the particle i of the input, in the order of the receivers.
+/// One of a set's arrays: get(i) for the particle i of the input, in the order of the set's particles.
 template <class Get>
-std::vector<vec3> inReceiverOrder(const Frame& frame, const Get& get) {
+std::vector<vec3> inSetOrder(const Frame& frame, const SplatSet& set, const Get& get) {
   const std::vector<std::uint32_t>& source = frame.density.source();
-  std::vector<vec3> result(source.size());
-  parallelBlocks(source.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) result[k] = get(source[k]);
+  std::vector<vec3> result(set.particles.size());
+  parallelBlocks(result.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) result[k] = get(source[set.receiverOf(k)]);
   });
+  return result;
+}
+
+/// The receivers that can be seen, ascending; empty, with `all` set, where it is all of them.
+std::vector<std::uint32_t> seenReceivers(const Frame& frame, const View& view, const layout::SplatScene& scene,
+                                         bool& all) {
+  const Receivers receivers = frame.density.receivers();
+  const std::vector<std::uint32_t>& source = frame.density.source();
+  const ParticleSet& particles = frame.particles;
+  std::vector<std::vector<std::uint32_t>> parts((receivers.size() + kBlock - 1) / kBlock);
+  parallelBlocks(receivers.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint32_t>& seen = parts[begin / kBlock];
+    for (std::size_t k = begin; k < end; ++k) {
+      layout::SplatParticle particle{};
+      particle.position = receivers.position(k), particle.radius = particles.radius[source[k]] * view.radiusScale;
+      const vec3 velocity = particles.velocity.empty() ? vec3(0) : particles.velocity[source[k]];
+      if (maybeSeen(particle, velocity, scene)) seen.push_back(static_cast<std::uint32_t>(k));
+    }
+  });
+  std::size_t count = 0;
+  for (const auto& part : parts) count += part.size();
+  all = count == receivers.size();
+  std::vector<std::uint32_t> result;
+  if (all) return result;
+  result.reserve(count);
+  for (auto& part : parts) {
+    result.insert(result.end(), part.begin(), part.end());
+    part = {};
+  }
   return result;
 }
 
@@ -125,24 +155,26 @@ SplatSet splatSet(const Frame& frame, const Scene& scene, const std::vector<vec3
   const Receivers receivers = frame.density.receivers();
   const std::vector<std::uint32_t>& source = frame.density.source();
   SplatSet set = frame.blank;
-  set.particles.resize(receivers.size());
+  const bool open = set.scene.openTime != set.scene.closeTime;
+  set.scene.moving = open && (!particles.velocity.empty() || !scene.camera.keys.empty()) ? 1 : 0;
+  bool allSeen = true;
+  set.receiver = seenReceivers(frame, scene.view, set.scene, allSeen);
+  set.particles.resize(allSeen ? receivers.size() : set.receiver.size());
   parallelBlocks(set.particles.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
-      const std::size_t i = source[k];
-      set.particles[k] = {.position = receivers.position(k),
+      const std::size_t receiver = set.receiverOf(k), i = source[receiver];
+      set.particles[k] = {.position = receivers.position(receiver),
                           .radius = particles.radius[i] * scene.view.radiusScale,
-                          .radiance = albedoOf(particles, scene.medium, i) * inScattered[k],
+                          .radiance = albedoOf(particles, scene.medium, i) * inScattered[receiver],
                           .peak = std::min(frame.peak[i] * peakScale, std::numeric_limits<float>::max())};
     }
   });
-  if (!grey) set.extinction = inReceiverOrder(frame, [&](std::size_t i) { return frame.extinction.of(i); });
+  if (!grey) set.extinction = inSetOrder(frame, set, [&](std::size_t i) { return frame.extinction.of(i); });
   const float emissionScale = scene.medium.emissionScale * spread(scene);
   if (!particles.emission.empty() && emissionScale > 0)
-    set.emission = inReceiverOrder(frame, [&](std::size_t i) { return particles.emission[i] * emissionScale; });
-  const bool open = set.scene.openTime != set.scene.closeTime;
+    set.emission = inSetOrder(frame, set, [&](std::size_t i) { return particles.emission[i] * emissionScale; });
   if (!particles.velocity.empty() && (open || scene.output.velocity))
-    set.velocity = inReceiverOrder(frame, [&](std::size_t i) { return particles.velocity[i]; });
-  set.scene.moving = open && (!set.velocity.empty() || !scene.camera.keys.empty()) ? 1 : 0;
+    set.velocity = inSetOrder(frame, set, [&](std::size_t i) { return particles.velocity[i]; });
   return set;
 }
 
@@ -151,8 +183,10 @@ std::vector<layout::SplatParticle> relit(const SplatSet& set, const Frame& frame
   const std::vector<std::uint32_t>& source = frame.density.source();
   std::vector<layout::SplatParticle> particles = set.particles;
   parallelBlocks(particles.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k)
-      particles[k].radiance = albedoOf(frame.particles, scene.medium, source[k]) * inScattered[k];
+    for (std::size_t k = begin; k < end; ++k) {
+      const std::size_t receiver = set.receiverOf(k);
+      particles[k].radiance = albedoOf(frame.particles, scene.medium, source[receiver]) * inScattered[receiver];
+    }
   });
   return particles;
 }

@@ -16,7 +16,8 @@ SplatSet readSprites(const Scene& scene, std::vector<std::string>& files);
 /// ends, half a frame before and after.
 void setCameras(const Scene& scene, int number, layout::uint falloff, SplatSet& set);
 
-/// What is drawn, in the order of the receivers: radiance is albedo · Color · in-scattered radiance.
+/// What can be seen, in the order of the receivers: radiance is albedo · Color · in-scattered radiance. Particles out
+/// of view are left out before anything is sorted or sent to a device.
 SplatSet splatSet(const Frame& frame, const Scene& scene, const std::vector<vec3>& inScattered);
 
 /// The particles of `set` with other light, for a layer of one light.

@@ -35,6 +35,7 @@ Json reproducible(const FrameStats& frame) {
       {"frame", frame.frame},
       {"particles", frame.particles},
       {"in_octree", frame.inOctree},
+      {"drawn", frame.drawn},
       {"lights", frame.lights},
       {"density_scale", frame.densityScale},
       {"subsample",

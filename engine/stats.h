@@ -24,6 +24,7 @@ struct LightMethod {
 struct FrameStats {
   int frame = 1;
   std::size_t particles = 0, inOctree = 0, lights = 0;
+  std::size_t drawn = 0;  ///< particles in view: sorted and splatted
   /// Wall clock: load (particles, meshes, sprites, their sums), octree (with calibration and "auto" sub-sampling),
   /// lighting (of particles and surfaces), sort, splat, write, total; solids (tree, camera rays, compositing) where
   /// there are any.

@@ -317,5 +317,43 @@ TEST(FullSplat, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(one.opticalDepth, seven.opticalDepth);
 }
 
+/// What is not maybeSeen() leaves no trace in either rasteriser; and little else is kept.
+TEST(FullSplat, WhatIsOutOfViewIsLeftOutAndNothingElse) {
+  const SplatCamera pinhole = cameraAtOrigin(60, 40);
+  SplatCamera lens = pinhole, parallel = pinhole, wide = pinhole;
+  lens.apertureRadius = 0.2f, lens.focusDistance = 4;
+  makeOrthographic(parallel, 4);
+  setPixelAspect(wide, 2);
+  SplatCamera turned = makeSplatCamera(vec3(0.3f, 0, 0), vec3(1, 0, -5), vec3(0, 1, 0), 40, 0.01f, 1000, 60, 40, 0);
+  for (const SplatCamera& camera : {pinhole, lens, parallel, wide})
+    for (const bool moving : {false, true}) {
+      SCOPED_TRACE(::testing::Message() << camera.apertureRadius << ' ' << camera.orthographic << ' '
+                                        << camera.pixelAspect << ' ' << moving);
+      std::size_t kept = 0, drawn = 0;
+      for (std::size_t i = 0; i < 3000; ++i) {
+        Random random(11, i);
+        const auto near = [&](double reach) { return static_cast<float>(random.uniform(-reach, reach)); };
+        SplatSet set = setOf(
+            {{vec3(near(4), near(4), near(8)), static_cast<float>(random.uniform(1e-3, 0.8)), vec3(1), 2}}, camera);
+        if (moving) {
+          set.velocity = {vec3(near(4), near(4), near(4))};
+          set.scene.moving = 1, set.scene.openTime = -0.2f, set.scene.closeTime = 0.3f;
+          if (i % 2 == 0 && camera.orthographic == 0) set.scene.close = turned;
+        }
+        const vec3 velocity = set.velocity.empty() ? vec3(0) : set.velocity[0];
+        const bool seen = maybeSeen(set.particles[0], velocity, set.scene);
+        const Image full = draw(set, {.depth = true});
+        double alpha = 0;
+        for (const vec4& pixel : full.pixels) alpha += pixel.w;
+        if (set.plain())
+          for (const vec4& pixel : rasterize(set.particles, identity(1), camera, true).pixels) alpha += pixel.w;
+        if (alpha > 0) ASSERT_TRUE(seen) << i;
+        kept += seen, drawn += alpha > 0;
+      }
+      EXPECT_GT(drawn, 200u);
+      EXPECT_LT(kept, drawn + drawn / 5);
+    }
+}
+
 }  // namespace
 }  // namespace mote

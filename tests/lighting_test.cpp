@@ -230,6 +230,18 @@ TEST(Beams, TakeEverySlotOnceInBeamsOfColumns) {
   }
 }
 
+TEST(Beams, AreNoneWhereNothingIsReached) {
+  const Octree tree = ballCloud(100, 18, 0.1, 0.1).tree(0, true, 1);
+  const std::vector<std::uint8_t> none(100, 0);
+  for (const layout::Light& light : {pointLight({0, 0, 0}), directionalLight({0, 0, 1})}) {
+    const Beams beams = planBeams(slotsOf(tree), light, none, tree.meanRadius);
+    EXPECT_EQ(beams.columns(), 0u);
+    EXPECT_TRUE(beams.receiver.empty());
+    EXPECT_EQ(planBeams(slotsOf(Octree{}), light, {}, 1).columns(), 0u);
+    EXPECT_EQ(opticalDepths(tree, slotsOf(tree), light, {}, none), std::vector<float>(100, 0.0f));
+  }
+}
+
 TEST(Column, FindsEveryParticleThatARayMeetsInTheOrderOfReach) {
   const Cloud cloud = ballCloud(5000, 20, 0.01, 0.2);
   const Octree tree = cloud.tree(0, true, 1);

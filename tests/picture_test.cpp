@@ -48,7 +48,9 @@ class Picture : public ::testing::Test {
     FrameStats stats;
     frame = prepareFrame(scene, 1, stats);
     Renderer renderer({false, false}, nullptr);
-    return renderer.draw(frame, scene, renderer.light(frame, lightWanted(scene), stats), stats);
+    Image image = renderer.draw(frame, scene, renderer.light(frame, lightWanted(scene), stats), stats);
+    drawn = stats.drawn;
+    return image;
   }
 
   const ImageLayer& layer(const Image& image, const std::string& name) {
@@ -59,6 +61,7 @@ class Picture : public ::testing::Test {
 
   TempFolder folder;
   Frame frame;
+  std::size_t drawn = 0;  ///< particles of the last picture
 };
 
 // A camera 4 units before the plane z = 0, whose picture is 2.4 high there.
@@ -334,6 +337,35 @@ TEST_F(Picture, LightLayersOfAPlainSceneSumToTheBeautyToo) {
   EXPECT_EQ(image.alpha.size(), image.pixels.size());
   EXPECT_EQ(image.velocity.size(), image.pixels.size());
   EXPECT_EQ(image.opticalDepth.size(), image.pixels.size());
+}
+
+/// Sort and splats see only what is in view; light layers, which come later, still find their particles.
+TEST_F(Picture, DrawsOnlyParticlesInView) {
+  writeBall(folder.file("particles.prt"));
+  const auto seen = [&](const char* target) {
+    return render(fmt::format(
+        R"("camera": {{"position": [0, 0, 4], "target": {}, "fov": 8, "near": 0.1, "far": 100}},
+           "lights": [{{"name": "a", "position": [2, 2, 2], "intensity": 40}},
+                      {{"name": "b", "position": [-2, 2, 1], "intensity": 30}}],
+           "output": {{"size": [48, 32], "aovs": ["lights", "Z", "velocity"]}})",
+        target));
+  };
+  const Image image = seen("[0.2, 0.1, 0]");
+  EXPECT_GT(drawn, 0u);
+  EXPECT_LT(drawn, frame.particles.size() / 2);
+  double brightest = 0;
+  for (std::size_t p = 0; p < image.pixels.size(); ++p)
+    for (int c = 0; c < 3; ++c) {
+      double sum = 0;
+      for (const ImageLayer& one : image.layers)
+        if (one.name.back() == "RGB"[c]) sum += one.values[p];
+      ASSERT_NEAR(sum, image.pixels[p][c], 2e-6 + 2e-6 * image.pixels[p][c]);
+      brightest = std::max(brightest, sum);
+    }
+  EXPECT_GT(brightest, 0.01);
+  const Image elsewhere = seen("[0, 0, 9]");
+  EXPECT_EQ(drawn, 0u);
+  for (const vec4& pixel : elsewhere.pixels) ASSERT_EQ(pixel, vec4(0));
 }
 
 TEST_F(Picture, LightingCastsOneRayAParticleAndLight) {

@@ -124,8 +124,8 @@ struct MemoryFacts {
 double particleBytes(const MemoryFacts& f, const Output& output) {
   const double set = 12 + 4 + 4 + 4 + 12.0 * (f.color + f.absorption + f.emission + f.velocity) + 8.0 * f.id;
   const double tree = f.share * (6 * 4 + 8 * f.absorption + f.cellNodes) + (f.sampled() ? 5 * 4 : 0);
-  const double sort = 8 + 4;                                  // (key, index) and order
-  const double splats = 2 * f.splat() + 12.0 * f.absorption;  // of the frame and of the rasteriser; factors of colours
+  const double sort = 8 + 4;                                                                 // (key, index) and order
+  const double splats = f.splat() + 12.0 * f.absorption;                                     // and factors of colours
   const double byLight = output.lights ? 12 * f.lights + sizeof(layout::SplatParticle) : 0;  // and one light's splats
   return set + tree + sort + splats + byLight;
 }
@@ -171,9 +171,9 @@ Json notCounted(const Scene& scene) {
   return list;
 }
 
-/// 1 µs a ray on two cores for a million particles (host/lighting/lighting.h); a ray meets the more, the more there are
-/// beside each other: N^(1/3) (DESIGN §5).
-double raySeconds(double particles) { return 2e-6 * std::cbrt(particles / 1e6) / threadCount(); }
+/// 0.25 µs a ray on two cores for a million particles (host/lighting/lighting.h); a ray meets the more, the more there
+/// are beside each other: N^(1/3) (DESIGN §5).
+double raySeconds(double particles) { return 5e-7 * std::cbrt(particles / 1e6) / threadCount(); }
 
 const char* nameOf(LightType type) {
   switch (type) {

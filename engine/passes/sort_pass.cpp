@@ -10,20 +10,18 @@ namespace {
 
 constexpr std::uint32_t kGroupSize = 64;  // no shared memory, so it need only fill a subgroup
 
-// More pairs an invocation mean fewer dispatches but longer code. lavapipe, 2²⁰ pairs, CPU seconds (over all threads)
-// without and with compiling: 4 pairs 1.04, 1.25; 8 pairs 0.82, 1.5; 16 pairs 0.80, 2.0. Graphics processors have
-// registers for 16 (32 words) without losing occupancy, and compile once.
-constexpr std::uint32_t kLog2ElementsOnCpu = 3, kLog2ElementsOnGpu = 4;
+// More pairs an invocation mean fewer dispatches but more registers. lavapipe, 2²⁰ pairs, CPU seconds over all threads,
+// and those of compiling: 8 pairs 0.26, 0.06; 16 pairs 0.213, 0.08; 32 pairs 0.218, 0.16. Graphics processors have
+// registers for 16 (32 words) without losing occupancy.
+constexpr std::uint32_t kLog2Elements = 4;
 
 std::uint64_t groups(std::uint64_t invocations) { return (invocations + kGroupSize - 1) / kGroupSize; }
 
 }  // namespace
 
 SortPass::SortPass(const Device& device, std::uint32_t log2Elements)
-    : log2Elements_(log2Elements > 0 ? log2Elements
-                    : device.isCpu() ? kLog2ElementsOnCpu
-                                     : kLog2ElementsOnGpu) {
-  MOTE_CHECK(log2Elements_, <=, 4u);  // 32 pairs took lavapipe 4 s to compile and were no faster
+    : log2Elements_(log2Elements > 0 ? log2Elements : kLog2Elements) {
+  MOTE_CHECK(log2Elements_, <=, 5u);
   for (std::uint32_t work : {layout::kSortBlocks, layout::kSortFlip, layout::kSortDisperse})
     merge_[work] = device.createComputePipeline(
         spirv::bitonic_merge_comp, sizeof(layout::SortParams),

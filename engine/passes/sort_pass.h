@@ -8,14 +8,14 @@
 namespace mote {
 
 /// Sorts any number of layout::SortPair in place, ascending as 64-bit numbers: equal keys stand in index order, as
-/// after std::stable_sort. O(N log² N) comparisons in Σ ⌈s / m⌉ dispatches for s = m+1 … ⌈log2 N⌉ (75 for 2²⁰ pairs and
-/// m = 3), each of which reads and writes every pair once.
+/// after std::stable_sort. O(N log² N) comparisons in Σ ⌈s / m⌉ dispatches for s = m+1 … ⌈log2 N⌉ (57 for 2²⁰ pairs and
+/// m = 4), each of which reads and writes every pair once.
 class SortPass {
  public:
   /// Most pairs that one sort takes.
   static constexpr std::uint32_t kMaxCount = 1u << 30;
 
-  /// 2^log2Elements pairs an invocation (1–4), or 0 for what suits the device.
+  /// 2^log2Elements pairs an invocation (1–5), or 0 for the fastest, 4.
   explicit SortPass(const Device& device, std::uint32_t log2Elements = 0);
 
   /// Bytes of the pair buffer: one more pair than `count`, which stands for everything beyond the end.

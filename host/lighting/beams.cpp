@@ -256,6 +256,7 @@ CountedCells countIntoCells(const Receivers& receivers, const Faces& faces, std:
     cells += grids[face].columns * grids[face].rows;
     rays += onFace;
   }
+  if (rays == 0) return {};
   const auto cellOf = [&](std::uint8_t face, const Crossing& ray) { return grids[face].cell(ray.u, ray.v); };
 
   // How many of each block go into each cell, then where they go: the same order for any number of threads.
@@ -286,6 +287,7 @@ Beams planBeams(const Receivers& receivers, const layout::Light& light, std::spa
                 double typicalRadius, const BeamLimits& limits) {
   const Faces faces(light, receivers.bounds().centre());
   CountedCells cells = countIntoCells(receivers, faces, reached);
+  if (cells.crossings.empty()) return {};
   std::vector<std::uint8_t> begins(cells.crossings.size(), 0);
   const Cutter cutter(receivers, faces, typicalRadius, limits, begins, cells.crossings.data());
   parallelBlocks(cells.start.size() - 1, 1, [&](std::size_t cell, std::size_t) {
@@ -298,7 +300,6 @@ Beams planBeams(const Receivers& receivers, const layout::Light& light, std::spa
     if (begins[i] & kBeamBegins) beams.start.push_back(static_cast<std::uint32_t>(i));
     beams.receiver[i] = cells.crossings[i].receiver;
   }
-  if (beams.start.empty()) return beams;
   beams.column.push_back(static_cast<std::uint32_t>(beams.start.size()));
   beams.start.push_back(static_cast<std::uint32_t>(beams.receiver.size()));
   return beams;

@@ -109,6 +109,15 @@ inline bool makeFullFootprint(const layout::SplatParticle& particle, const vec3&
   return f.lo.x < f.hi.x && f.lo.y < f.hi.y;
 }
 
+/// False only where no rasteriser draws anything of the particle, fast way or full.
+inline bool maybeSeen(const layout::SplatParticle& particle, const vec3& velocity, const layout::SplatScene& scene) {
+  FullFootprint full;
+  Footprint fast;
+  return makeFullFootprint(particle, velocity, scene, full) ||
+         (scene.moving == 0 && scene.camera.orthographic == 0 &&
+          makeFootprint(particle.position, particle.radius, scene.camera, fast));
+}
+
 /// Screen velocity of particle and camera [pixels per frame], y upward.
 inline vec2 screenVelocity(const vec3& position, const vec3& velocity, const layout::SplatScene& scene) {
   const vec3 step = velocity * scene.halfFrame;

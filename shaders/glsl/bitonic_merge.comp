@@ -25,20 +25,25 @@ uint64_t pairs[kElements];
 
 void order(uint a, uint b) {
   const uint64_t first = pairs[a], second = pairs[b];
-  const bool swap = first > second;
-  pairs[a] = swap ? second : first;
-  pairs[b] = swap ? first : second;
+  pairs[a] = min(first, second);
+  pairs[b] = max(first, second);
 }
 
-void flip(uint size) {
+// Loops count up by one, as often as a constant says: others are not unrolled by every compiler (Mesa 22.3 knows no
+// shifts), and an array that a loop indexes is not kept in registers.
+void flip(uint log2Size) {
+  const uint size = 1u << log2Size;
   [[unroll]] for (uint i = 0; i < kElements; ++i)
     if ((i & (size >> 1)) == 0) order(i, i ^ (size - 1));
 }
 
-void disperse(uint size) {
-  [[unroll]] for (uint j = size >> 1; j > 0; j >>= 1)
-    [[unroll]] for (uint i = 0; i < kElements; ++i)
-      if ((i & j) == 0) order(i, i + j);
+void disperse(uint log2Size) {
+  [[unroll]] for (uint step = 0; step < kLog2Elements; ++step)
+    if (step < log2Size) {
+      const uint j = (1u << log2Size) >> (step + 1);
+      [[unroll]] for (uint i = 0; i < kElements; ++i)
+        if ((i & j) == 0) order(i, i + j);
+    }
 }
 
 void main() {
@@ -59,15 +64,15 @@ void main() {
   WidePairBuffer wide = WidePairBuffer(params.pairs);
   [[unroll]] for (uint t = 0; t < kElements; ++t) pairs[t] = wide.at[slots[t]];
   if (kWork == kSortBlocks) {
-    [[unroll]] for (uint size = 2; size <= kElements; size <<= 1) {
-      flip(size);
-      disperse(size >> 1);
+    [[unroll]] for (uint log2Size = 1; log2Size <= kLog2Elements; ++log2Size) {
+      flip(log2Size);
+      disperse(log2Size - 1);
     }
   } else if (kWork == kSortFlip) {
-    flip(kElements);
-    disperse(kElements >> 1);
+    flip(kLog2Elements);
+    disperse(kLog2Elements - 1);
   } else {
-    disperse(kElements);
+    disperse(kLog2Elements);
   }
   [[unroll]] for (uint t = 0; t < kElements; ++t) wide.at[slots[t]] = pairs[t];
 }

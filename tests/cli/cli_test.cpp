@@ -453,7 +453,7 @@ TEST(MoteInfo, CountsTheMemoryOfWhatASceneAdds) {
   EXPECT_GE(more("host_bytes", R"(, "output": {"aovs": ["lights"]})"), n * 2 * 12 + pixels * 2 * 12);
   EXPECT_EQ(more("host_bytes", R"(, "output": {"aovs": ["Z", "velocity", "optical_depth", "shadow"]})"),
             pixels * (4 + 8 + 4 + 2 * 4));
-  EXPECT_GE(more("host_bytes", R"(, "medium": {"extinction": [1, 2, 3]})"), n * 2 * 12 + pixels * 12);
+  EXPECT_GE(more("host_bytes", R"(, "medium": {"extinction": [1, 2, 3]})"), n * 12 + pixels * 12);
   EXPECT_GE(more("device_bytes", R"(, "medium": {"extinction": [1, 2, 3]})"), n * 12);
   EXPECT_GE(more("host_bytes", solid), pixels * 76) << "surfaces";
   // Nine tenths fewer in the tree, 20 bytes for each receiver.

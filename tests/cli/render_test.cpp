@@ -142,6 +142,7 @@ TEST_F(MoteRender, StatsHaveTheKeysOfTheContract) {
   EXPECT_EQ(frame["frame"], 1);
   EXPECT_EQ(frame["particles"], 2000);
   EXPECT_EQ(frame["in_octree"], 2000);
+  EXPECT_EQ(frame["drawn"], 2000);
   EXPECT_EQ(frame["lights"], 1);
   for (const char* stage : {"load", "octree", "lighting", "sort", "splat", "write", "total"}) {
     ASSERT_TRUE(frame["seconds"].contains(stage)) << stage;

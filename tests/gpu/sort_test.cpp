@@ -85,13 +85,29 @@ TEST_F(SortTest, SortsSizesAroundPowersOfTwo) {
 
 TEST_F(SortTest, SortsAMillionAndOne) { expectSortsLikeTheHost(randomPairs(1'000'001, ~0u)); }
 
+TEST_F(SortTest, SortsSixteenMillion) {
+  const std::uint32_t count = 1u << 24;
+  const std::vector<SortPair> pairs = randomPairs(count, ~0u);
+  const SortPass sort(device());
+  const Buffer buffer = device().createBuffer(SortPass::pairBytes(count));
+  device().upload(buffer, std::span(pairs));
+  device().run([&](CommandBuffer& commands) { sort.record(commands, buffer, count); });
+  const std::vector<SortPair> sorted = device().download<SortPair>(buffer, count);
+  // Strictly ascending numbers of which each was there: the one order.
+  std::size_t wrong = 0;
+  for (std::size_t i = 0; i < count; ++i)
+    wrong += sorted[i].index >= count || sorted[i].key != pairs[sorted[i].index].key ||
+             (i > 0 && wide(sorted[i - 1]) >= wide(sorted[i]));
+  EXPECT_EQ(wrong, 0u);
+}
+
 TEST_F(SortTest, SortsRandomSizes) {
   for (std::uint64_t trial = 0; trial < 12; ++trial)
     expectSortsLikeTheHost(randomPairs(hashBits(7, trial) % 50'000, 1000));
 }
 
 TEST_F(SortTest, SortsWithAnyNumberOfPairsAnInvocation) {
-  for (std::uint32_t log2Elements = 1; log2Elements <= 4; ++log2Elements)
+  for (std::uint32_t log2Elements = 1; log2Elements <= 5; ++log2Elements)
     expectSortsLikeTheHost(randomPairs(5'003, 300), log2Elements);
 }
 

@@ -12,7 +12,7 @@
 namespace mote {
 namespace {
 
-constexpr double kMostRatio = 40;
+constexpr double kMostRatio = 10;
 
 std::uint64_t asNumber(const layout::SortPair& pair) { return std::uint64_t{pair.key} << 32 | pair.index; }
 
