@@ -4,7 +4,6 @@
 #include <array>
 #include <atomic>
 #include <bit>
-#include <cstdlib>
 
 #include "host/core/log.h"
 #include "host/core/parallel.h"
@@ -16,8 +15,8 @@ namespace mote {
 /// Everything that depends on the kind of device.
 struct LightPass::Tuning {
   BeamLimits beams;
-  std::uint32_t groupSize;     ///< a multiple of every subgroup size
-  std::uint32_t groupRays, groups;  ///< rays of a group, groups of a packet: at most the least subgroup size
+  std::uint32_t groupSize;          ///< a multiple of every subgroup size
+  std::uint32_t groupRays, groups;  ///< rays of a group, groups of a set: at most the least subgroup size
   std::uint32_t foundCapacity, chosenCapacity;
   std::uint32_t pieceColumns, pieceBeams, pieceRays;  ///< at most; beams and rays may be passed by one column's
 };
@@ -27,10 +26,9 @@ namespace {
 /// From a point of a column's frame, particles farther than this many least radii are placed in double.
 constexpr double kExactRadii = 128;
 
-std::uint32_t knob(const char* name, std::uint32_t value) {
-  const char* text = std::getenv(name);
-  return text ? static_cast<std::uint32_t>(std::atoi(text)) : value;
-}
+/// Blocks of particles, a subgroup wide, that a column's list has on lavapipe. It ends a shader's loops after 65535
+/// steps altogether: a beam of 300 rays looks at a block 4 · 10 times at most, which leaves enough for the rest.
+constexpr std::uint32_t kMostBlocks = 1024;
 
 /// Points as (x, y, z, w) with w from `fourth`, interleaved in pieces: no second copy of all on the host.
 Buffer uploadPoints(const Device& device, const Receivers& points, std::span<const float> fourth) {
@@ -50,7 +48,7 @@ Buffer uploadPoints(const Device& device, const Receivers& points, std::span<con
 vec3 lowPart(const dvec3& value) { return vec3(value - dvec3(vec3(value))); }
 float lowPart(double value) { return static_cast<float>(value - static_cast<double>(static_cast<float>(value))); }
 
-/// `amid`: the middle of the tree. Returns also how far from there the frame's numbers start.
+/// `amid`: the middle of the tree.
 layout::LightColumn headerOf(const Column& column, const dvec3& amid) {
   const LightFrame& frame = column.frame;
   layout::LightColumn header{};
@@ -118,12 +116,14 @@ layout::LightRay rayOf(const BeamRays& rays, std::size_t k) {
 LightPass::Tuning LightPass::tuning(const Device& device) {
   Tuning t{};
   if (device.isCpu()) {
-    t.beams = {knob("COLUMN", 2048), knob("BEAM", 240)};
-    t.groupSize = device.subgroupSize();
-    t.groupRays = std::min(knob("GRAYS", 8), t.groupSize), t.groups = std::min(knob("GROUPS", 4), t.groupSize);
-    t.foundCapacity = knob("FOUND", 8192), t.chosenCapacity = knob("CHOSEN", 2048);
-    t.pieceColumns = knob("PCOLUMNS", 32), t.pieceBeams = 512, t.pieceRays = 1 << 17;
+    const std::uint32_t width = device.subgroupSize();
+    t.beams = {2048, 240};
+    t.groupSize = width;
+    t.groupRays = std::min(8u, width), t.groups = std::min(4u, width);
+    t.foundCapacity = std::min(8192u, kMostBlocks * width), t.chosenCapacity = 2048;
+    t.pieceColumns = 32, t.pieceBeams = 512, t.pieceRays = 1 << 17;
   } else {
+    // Not measured: few rays a set spare registers, many columns keep all of a device busy.
     t.beams = {1024, 256};
     t.groupSize = std::max(64u, device.mostSubgroupSize());
     t.groupRays = t.groups = std::min(4u, device.leastSubgroupSize());
@@ -146,9 +146,12 @@ LightPass::LightPass(const Device& device, layout::uint falloff, layout::uint en
 
 std::vector<SpecializationConstant> LightPass::constants(bool perspective, bool careful) const {
   const Tuning t = tuning(device_);
-  return {{0, t.groupSize},      {1, static_cast<std::uint32_t>(tree_->channels())},
-          {2, perspective},      {3, careful},
-          {4, t.foundCapacity},  {5, t.chosenCapacity},
+  return {{0, t.groupSize},
+          {1, static_cast<std::uint32_t>(tree_->channels())},
+          {2, perspective},
+          {3, careful},
+          {4, t.foundCapacity},
+          {5, t.chosenCapacity},
           {6, device_.mostSubgroupSize()}};
 }
 
@@ -156,8 +159,7 @@ const ComputePipeline& LightPass::gather(const GatherVariant& variant) {
   ComputePipeline& made = gathers_[variant];
   if (made.handle() == VK_NULL_HANDLE)
     made = device_.createComputePipeline(variant.exact ? spirv::light_gather_exact_comp : spirv::light_gather_comp,
-                                         sizeof(layout::LightParams),
-                                         constants(variant.perspective, variant.careful));
+                                         sizeof(layout::LightParams), constants(variant.perspective, variant.careful));
   return made;
 }
 
@@ -166,8 +168,7 @@ const ComputePipeline& LightPass::sum(const SumVariant& variant) {
   if (made.handle() != VK_NULL_HANDLE) return made;
   const Tuning t = tuning(device_);
   std::vector<SpecializationConstant> all = constants(variant.perspective, variant.careful);
-  all.insert(all.end(),
-             {{7, t.groupRays}, {8, t.groups}, {9, falloff_}, {10, endpoint_}, {11, variant.nearLight}});
+  all.insert(all.end(), {{7, t.groupRays}, {8, t.groups}, {9, falloff_}, {10, endpoint_}, {11, variant.nearLight}});
   made = device_.createComputePipeline(spirv::light_sum_comp, sizeof(layout::LightParams), all);
   return made;
 }
@@ -277,14 +278,16 @@ std::vector<float> LightPass::run(const Piece& piece, float limit) {
   const auto grow = [&](Buffer& buffer, std::size_t bytes) {
     if (buffer.size() < bytes) buffer = device_.createBuffer(std::bit_ceil(bytes));
   };
-  const std::size_t columns = piece.columns.size(), beams = piece.plain.size() + piece.careful.size(), rays = piece.rays.size();
+  const std::size_t columns = piece.columns.size(), beams = piece.plain.size() + piece.careful.size(),
+                    rays = piece.rays.size();
   const std::size_t channels = tree_->channels();
   Buffers& to = buffers_;
   grow(to.columns, columns * sizeof(layout::LightColumn)), grow(to.planes, 8 * columns * sizeof(vec4));
   grow(to.walks, columns * sizeof(layout::LightWalk)), grow(to.beams, beams * sizeof(layout::LightBeam));
   grow(to.rays, rays * sizeof(layout::LightRay)), grow(to.depths, channels * rays * sizeof(float));
   grow(to.found, columns * layout::kFoundLists * t.foundCapacity * sizeof(vec4));
-  grow(to.order, columns * (layout::kOrderLists * t.foundCapacity + layout::kLightBins * device_.mostSubgroupSize()) * sizeof(layout::uint));
+  grow(to.order, columns * (layout::kOrderLists * t.foundCapacity + layout::kLightBins * device_.mostSubgroupSize()) *
+                     sizeof(layout::uint));
   grow(to.chosen, beams * layout::kChosenLists * t.chosenCapacity * sizeof(vec4));
   grow(to.chosenIndex, beams * layout::kChosenLists * t.chosenCapacity * sizeof(layout::uint));
   deviceBytes_ = std::max(deviceBytes_, nodes_.size() + particles_.size() + peaks_.size() + to.bytes());

@@ -181,8 +181,8 @@ class Cutter {
     for (std::size_t s = 0; s + 1 < starts.size(); ++s) {
       Crossing *strip = begin + starts[s], *stripEnd = begin + starts[s + 1];
       const std::size_t inStrip = starts[s + 1] - starts[s];
-      const auto pieces =
-          splitEvenly<&Crossing::v>(strip, stripEnd, box.lo.y, box.hi.y, (inStrip + limits_.beamRays - 1) / limits_.beamRays);
+      const auto pieces = splitEvenly<&Crossing::v>(strip, stripEnd, box.lo.y, box.hi.y,
+                                                    (inStrip + limits_.beamRays - 1) / limits_.beamRays);
       for (std::size_t p = 0; p + 1 < pieces.size(); ++p) cutIntoBeams(strip + pieces[p], strip + pieces[p + 1]);
     }
   }
@@ -191,7 +191,8 @@ class Cutter {
   void cutIntoBeams(Crossing* begin, Crossing* end) const {
     const auto count = static_cast<std::size_t>(end - begin);
     const CellGrid box = boxOf(begin, end);
-    if (count == 1 || (count <= limits_.beamRays + limits_.beamRays / 4 && box.width() <= kWidestBeam * radiusAt(*begin))) {
+    if (count == 1 ||
+        (count <= limits_.beamRays + limits_.beamRays / 4 && box.width() <= kWidestBeam * radiusAt(*begin))) {
       mark(begin) |= kBeamBegins;
       return;
     }

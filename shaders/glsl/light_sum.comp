@@ -1,16 +1,18 @@
 // The optical depths of a beam's rays from what light_gather.comp found for its column: the twin of choose and sum in
 // host/lighting (beam_kernel.h), for one subgroup a beam.
 //
-// First the column's particles that may touch the beam are chosen, in the order of their reach. Then rays go in packets
-// of kRays. A lane has a particle of its own and all rays of the packet, the same in all lanes; sums are added up over
-// the lanes at the end. A beam's rays stand by their depth, so a group of kGroupRays covers a short piece of it: what
-// lies before the piece is wholly in the way of all its rays and goes through the short formula, also for all groups
-// behind; what may straddle a start goes through the long one, for that group alone; what lies behind is never looked
-// at. Every loop runs over whole blocks of particles, a subgroup wide, with the same bounds in all lanes.
+// First the column's particles that may touch the beam are chosen, in the order of their reach: by boxes of four bytes,
+// so what most of them cost is a word. Then rays go in sets of kRays. A lane has a particle of its own and all rays of
+// the set, the same in all lanes; sums are added up over the lanes at the end. A beam's rays stand by their depth, so a
+// group of kGroupRays covers a short piece of it: what lies before the piece is wholly in the way of all its rays and
+// goes through the short formula, also for all groups behind; what may straddle a start goes through the long one, for
+// that group alone; what lies behind is never looked at. Every loop runs over whole blocks of particles, a subgroup
+// wide, with the same bounds in all lanes.
 //
 // On hardware rays are scalars, particles are loads side by side, and nothing diverges. On lavapipe (Mesa 22.3) a load
 // inside of a loop takes about 90 instructions for each component of a subgroup, and a broadcast 54: so what is loaded
-// must meet many rays, and nothing is broadcast.
+// must meet many rays, and nothing is broadcast. Loops over rays must unroll, or their arrays live in memory: NIR
+// unrolls those that count by ones, from and to what is known when the shader is compiled.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "lib/light_scratch.glsl"
@@ -33,7 +35,7 @@ const float kGreatestInverseArea = 1e36;
 LightBeam beam;
 LightWalk walk;
 uint beamIndex, chosenCount;
-// Of the packet's rays: the same in all lanes …
+// Of the set's rays: the same in all lanes …
 float rayU[kRays], rayV[kRays], rayULow[kRays], rayVLow[kRays], rayDepth[kRays], rayDepthLow[kRays], rayNorm[kRays];
 uint raySelf[kRays];
 // … and what the lane's particles add to each.
@@ -232,8 +234,8 @@ bool allDark(const uint group) {
     } while (at < firstAtStart[K] && !dark);              \
   }
 
-/// One packet against what is chosen.
-void addPacket(uint first) {
+/// One set against what is chosen.
+void addSet(uint first) {
   const uint last = beam.rayCount - 1;
   [[unroll]] for (uint g = 0; g < kGroups; ++g) {
     [[unroll]] for (uint j = 0; j < kGroupRays; ++j) {
@@ -267,7 +269,7 @@ void addPacket(uint first) {
 }
 
 /// Adds to what is there.
-void storePacket(uint first) {
+void storeSet(uint first) {
   const uint lane = gl_SubgroupInvocationID;
   [[unroll]] for (uint g = 0; g < kGroups; ++g) {
     float red = 0.0, green = 0.0, blue = 0.0;  // of the lane's ray
@@ -302,9 +304,9 @@ void main() {
     at = choose(at);
     uint first = 0;
     do {
-      addPacket(first);
+      addSet(first);
       if (kNearLight) addNearLight();
-      storePacket(first);
+      storeSet(first);
       first += kRays;
     } while (first < beam.rayCount);
     walk.nearCount = 0;

@@ -32,8 +32,8 @@ MOTE_ASSERT_OFFSET(Light, cosInner, 52);
 MOTE_ASSERT_OFFSET(Light, cosOuter, 56);
 MOTE_ASSERT_SIZE(Light, 60);
 
-// One column of rays (host/lighting/column.h) as light_gather.comp takes it. Particles are placed from `middle`, a point on
-// the axis amid the tree, so that what is computed is short; …Low is what rounding to float left.
+// One column of rays (host/lighting/column.h) as light_gather.comp takes it. Particles are placed from `middle`, a
+// point on the axis amid the tree, so that what is computed is short; …Low is what rounding to float left.
 struct LightColumn {
   vec3 planeOrigin;       // what the planes are relative to [scene units]
   float depthBase;        // depths are the distances from the light (directional: along the travel) less this
@@ -148,8 +148,8 @@ MOTE_ASSERT_OFFSET(LightRay, depthLow, 24);
 MOTE_ASSERT_SIZE(LightRay, 28);
 
 // Scratch lists, `capacity` long. Of a column, as vec4: u, v, 1/r², peak · depth, radius, depthLow, slot · uLow, vLow,
-// green peak, blue peak (careful or in colour). As uint: the order by reach · boxes (as LightBeam::box) as they were found ·
-// boxes by reach; then counters of the bins.
+// green peak, blue peak (careful or in colour). As uint: the order by reach · boxes (as LightBeam::box) as they were
+// found · boxes by reach; then counters of the bins.
 MOTE_CONST uint kFoundLists = 3u;
 MOTE_CONST uint kOrderLists = 3u;
 MOTE_CONST uint kLightBins = 128u;

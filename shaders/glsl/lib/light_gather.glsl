@@ -91,8 +91,8 @@ void main() {
   walk.count = walk.nearCount = 0;
   uint steps = 0;
   float lowest = kFarOff, highest = -kFarOff, greatest = 0.0;
-  while ((walk.slot < walk.end || walk.node < params.nodeCount) && walk.count + walk.nearCount + width <= kFoundCapacity &&
-         steps < kMostSteps) {
+  while ((walk.slot < walk.end || walk.node < params.nodeCount) &&
+         walk.count + walk.nearCount + width <= kFoundCapacity && steps < kMostSteps) {
     while (walk.slot >= walk.end && walk.node < params.nodeCount && steps < kMostSteps) {  // to the next leaf
       const Node node = params.nodes.at[walk.node];
       const vec3 extent = 0.5 * (node.hi - node.lo), centre = 0.5 * (node.lo + node.hi) - column.planeOrigin;
