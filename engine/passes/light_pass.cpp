@@ -116,6 +116,8 @@ layout::LightRay rayOf(const BeamRays& rays, std::size_t k) {
 LightPass::Tuning LightPass::tuning(const Device& device) {
   Tuning t{};
   if (device.isCpu()) {
+    // Measured on lavapipe (300,000 rays of bench lighting, 256 bits): a flat optimum. Columns of 1024–4096
+    // rays, beams of 128–480, sets of 8 × 4 or 4 × 8 rays and pieces of 32 or 64 columns are within 10 % of each other.
     const std::uint32_t width = device.subgroupSize();
     t.beams = {2048, 240};
     t.groupSize = width;
