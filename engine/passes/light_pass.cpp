@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <bit>
 
 #include "host/core/log.h"
 #include "host/core/parallel.h"
@@ -115,20 +114,22 @@ layout::LightRay rayOf(const BeamRays& rays, std::size_t k) {
 
 LightPass::Tuning LightPass::tuning(const Device& device) {
   Tuning t{};
-  if (device.isCpu()) {
-    // Measured on lavapipe (300,000 rays of bench lighting, 256 bits): a flat optimum. Columns of 1024–4096
-    // rays, beams of 128–480, sets of 8 × 4 or 4 × 8 rays and pieces of 32 or 64 columns are within 10 % of each other.
-    const std::uint32_t width = device.subgroupSize();
-    t.beams = {2048, 240};
-    t.groupSize = width;
+  const std::uint32_t width = device.leastSubgroupSize();
+  if (std::getenv("AS_GPU") == nullptr && device.isCpu()) {
+    // lavapipe with subgroups of 8, times relative to these numbers on 1 M particles: packets of 16 rays 1.07, of 24
+    // 1.02, of 64 1.05 and twice as long to compile; columns of 2048 rays 1.1; beams of 192 1.1, of 320 the same.
+    t.beams = {4096, 256};
+    t.groupSize = device.subgroupSize();
     t.groupRays = std::min(8u, width), t.groups = std::min(4u, width);
-    t.foundCapacity = std::min(8192u, kMostBlocks * width), t.chosenCapacity = 2048;
-    t.pieceColumns = 32, t.pieceBeams = 512, t.pieceRays = 1 << 17;
+    // A shader has 65535 steps of loops. A beam has up to 320 rays: (320 / groupRays) · foundCapacity / width of them
+    // where every particle straddles every start, 40960 with this.
+    t.foundCapacity = std::min(knob("FOUND", 8192u), 128 * width * width);
+    t.chosenCapacity = std::min(knob("CHOSEN", 2048u), t.foundCapacity);
+    t.pieceColumns = knob("PCOLUMNS", 32), t.pieceBeams = 448, t.pieceRays = 1 << 17;
   } else {
-    // Not measured: few rays a set spare registers, many columns keep all of a device busy.
     t.beams = {1024, 256};
     t.groupSize = std::max(64u, device.mostSubgroupSize());
-    t.groupRays = t.groups = std::min(4u, device.leastSubgroupSize());
+    t.groupRays = t.groups = std::min(4u, width);
     t.foundCapacity = 8192, t.chosenCapacity = 2048;
     t.pieceColumns = 512, t.pieceBeams = 2048, t.pieceRays = 1 << 19;
   }
@@ -278,7 +279,7 @@ LightPass::Piece LightPass::setUp(const Receivers& receivers, const layout::Ligh
 std::vector<float> LightPass::run(const Piece& piece, float limit) {
   const Tuning t = tuning(device_);
   const auto grow = [&](Buffer& buffer, std::size_t bytes) {
-    if (buffer.size() < bytes) buffer = device_.createBuffer(std::bit_ceil(bytes));
+    if (buffer.size() < bytes) buffer = device_.createBuffer(bytes + bytes / 8);
   };
   const std::size_t columns = piece.columns.size(), beams = piece.plain.size() + piece.careful.size(),
                     rays = piece.rays.size();
@@ -288,7 +289,7 @@ std::vector<float> LightPass::run(const Piece& piece, float limit) {
   grow(to.walks, columns * sizeof(layout::LightWalk)), grow(to.beams, beams * sizeof(layout::LightBeam));
   grow(to.rays, rays * sizeof(layout::LightRay)), grow(to.depths, channels * rays * sizeof(float));
   grow(to.found, columns * layout::kFoundLists * t.foundCapacity * sizeof(vec4));
-  grow(to.order, columns * (layout::kOrderLists * t.foundCapacity + layout::kLightBins * device_.mostSubgroupSize()) *
+  grow(to.order, columns * (layout::kOrderLists * t.foundCapacity + layout::kLightBins * (1 + device_.mostSubgroupSize())) *
                      sizeof(layout::uint));
   grow(to.chosen, beams * layout::kChosenLists * t.chosenCapacity * sizeof(vec4));
   grow(to.chosenIndex, beams * layout::kChosenLists * t.chosenCapacity * sizeof(layout::uint));

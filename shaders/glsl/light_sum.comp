@@ -85,8 +85,8 @@ uint choose(uint at) {
 
 /// The first chosen particle whose reach is in this bin or a later one; each lane for its own.
 uint firstFrom(uint bin) {
-  const uint inOrder = chosenList(beamIndex, 0), width = gl_SubgroupSize;
-  uint behind = params.order.at[binCounters(beam.column) + max(bin, 1) * width - 1];
+  const uint inOrder = chosenList(beamIndex, 0);
+  uint behind = params.order.at[binEnds(beam.column) + max(bin, 1) - 1];
   if (bin == 0) behind = 0;
   uint low = 0, high = chosenCount;
   while (subgroupAny(low < high)) {

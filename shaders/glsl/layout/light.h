@@ -149,7 +149,7 @@ MOTE_ASSERT_SIZE(LightRay, 28);
 
 // Scratch lists, `capacity` long. Of a column, as vec4: u, v, 1/r², peak · depth, radius, depthLow, slot · uLow, vLow,
 // green peak, blue peak (careful or in colour). As uint: the order by reach · boxes (as LightBeam::box) as they were
-// found · boxes by reach; then counters of the bins.
+// found · boxes by reach; then how many stand before each bin's end, and counters.
 MOTE_CONST uint kFoundLists = 3u;
 MOTE_CONST uint kOrderLists = 3u;
 MOTE_CONST uint kLightBins = 128u;
@@ -168,7 +168,7 @@ struct LightParams {
   MOTE_ADDRESS(LightRayBuffer) rays;
   MOTE_ADDRESS(FloatBuffer) opticalDepths;  // in and out, [channel][ray]: Σ τ before shadowDensity
   MOTE_ADDRESS(Vec4Buffer) found;           // scratch, [column][kFoundLists][capacity]
-  MOTE_ADDRESS(UintBuffer) order;           // scratch, [column]: [kOrderLists][capacity], [kLightBins][widest subgroup]
+  MOTE_ADDRESS(UintBuffer) order;           // scratch, [column]: [kOrderLists][capacity], [kLightBins], [kLightBins][widest subgroup]
   MOTE_ADDRESS(Vec4Buffer) chosen;          // scratch, [beam][kChosenLists][capacity]
   MOTE_ADDRESS(UintBuffer) chosenIndex;     // scratch, [beam][kChosenLists][capacity]
   uint nodeCount;

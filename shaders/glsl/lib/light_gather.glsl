@@ -23,7 +23,7 @@
 #define WHOLE3(high, low) (high)
 #endif
 
-const uint kMostSteps = 48000;  // of the walk, a dispatch: with the sort's below 65535
+const uint kMostSteps = 48000;  // of the walk's loops, a dispatch: with the sort's below 65535
 const uint kPlanes = 6;         // as ColumnPlanes
 // As in host/lighting/column.h.
 const float kNearLightRadii = 8.0;
@@ -34,11 +34,11 @@ const float kFarOff = 3e38;
 float lowPart(Real value) { return float(value - Real(float(value))); }
 
 /// By ascending bin of their reach, into the lists of the order. Each lane counts its own, so nothing is atomic and the
-/// order is the same every time. Counters end as the places behind their bins' last.
+/// order is the same every time.
 void sortByReach(uint column, LightWalk walk) {
   const uint lane = gl_SubgroupInvocationID, width = gl_SubgroupSize;
   const uint order = orderList(column, 0), boxes = orderList(column, 1), sortedBoxes = orderList(column, 2),
-             bins = binCounters(column), ends = foundList(column, 1);
+             bins = binCounters(column), ends = foundList(column, 1), lasts = binEnds(column);
   for (uint bin = 0; bin < kLightBins; ++bin) params.order.at[bins + bin * width + lane] = 0;
   for (uint at = 0; at < walk.count; at += width)
     if (at + lane < walk.count) {
@@ -50,7 +50,8 @@ void sortByReach(uint column, LightWalk walk) {
     const uint count = params.order.at[bins + bin * width + lane];
     const uint sum = subgroupInclusiveAdd(count);
     params.order.at[bins + bin * width + lane] = before + sum - count;
-    before += subgroupBroadcast(sum, width - 1);
+    before += subgroupAdd(count);
+    if (subgroupElect()) params.order.at[lasts + bin] = before;
   }
   for (uint at = 0; at < walk.count; at += width)
     if (at + lane < walk.count) {
@@ -93,6 +94,7 @@ void main() {
   float lowest = kFarOff, highest = -kFarOff, greatest = 0.0;
   while ((walk.slot < walk.end || walk.node < params.nodeCount) &&
          walk.count + walk.nearCount + width <= kFoundCapacity && steps < kMostSteps) {
+    steps += 3;  // of this loop, and those in which the two inside of it end
     while (walk.slot >= walk.end && walk.node < params.nodeCount && steps < kMostSteps) {  // to the next leaf
       const Node node = params.nodes.at[walk.node];
       const vec3 extent = 0.5 * (node.hi - node.lo), centre = 0.5 * (node.lo + node.hi) - column.planeOrigin;

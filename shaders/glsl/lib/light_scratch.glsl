@@ -32,9 +32,10 @@ void shareWrites() {
 uint foundList(uint column, uint list) { return (column * kFoundLists + list) * kFoundCapacity; }
 uint chosenList(uint beam, uint list) { return (beam * kChosenLists + list) * kChosenCapacity; }
 uint orderList(uint column, uint list) {
-  return column * (kOrderLists * kFoundCapacity + kLightBins * kWidestSubgroup) + list * kFoundCapacity;
+  return column * (kOrderLists * kFoundCapacity + kLightBins * (1 + kWidestSubgroup)) + list * kFoundCapacity;
 }
-uint binCounters(uint column) { return orderList(column, kOrderLists); }  // [bin][lane]
+uint binEnds(uint column) { return orderList(column, kOrderLists); }
+uint binCounters(uint column) { return binEnds(column) + kLightBins; }  // [bin][lane]
 
 /// Never decreases with the reach, which is all that is asked of it.
 uint binOf(float reach, LightWalk walk) {
