@@ -7,13 +7,10 @@
 #include "host/core/error.h"
 #include "host/core/log.h"
 #include "host/core/parallel.h"
-#include "host/core/sha256.h"
 #include "host/core/timer.h"
 #include "host/lighting/auto_subsample.h"
 #include "host/lighting/medium.h"
-#include "host/particles/particle_loader.h"
 #include "host/scene/fitting.h"
-#include "host/scene/frame_path.h"
 #include "host/solids/mesh.h"
 
 namespace mote {
@@ -32,13 +29,6 @@ layout::Light toLight(const LightSource& source) {
           .castsShadows = source.castsShadows ? 1u : 0u,
           .cosInner = static_cast<float>(std::cos(source.innerAngle * kPi / 180)),
           .cosOuter = static_cast<float>(std::cos(source.outerAngle * kPi / 180))};
-}
-
-std::vector<FrameInput> hashInputs(const std::vector<std::string>& files) {
-  std::vector<FrameInput> inputs;
-  for (auto file = files.begin(); file != files.end(); ++file)
-    if (std::find(files.begin(), file, *file) == file) inputs.push_back({*file, sha256OfFile(*file)});
-  return inputs;
 }
 
 /// The arrays that the density tree is made of, and their owner.
@@ -163,18 +153,6 @@ Viewer viewerOf(const layout::SplatCamera& camera) {
   return {.eye = camera.position, .parallel = camera.orthographic != 0, .toCamera = -camera.forward};
 }
 
-/// Everything that comes from files: particles, meshes and, for a picture, sprites.
-void load(const Scene& scene, FramePurpose purpose, Frame& frame, FrameStats& stats) {
-  std::vector<std::string> files;
-  frame.particles = loadParticles(scene.particles, frame.number, scene.medium.densityMode, &files);
-  for (const Solid& solid : scene.solids) {
-    frame.meshes.push_back(loadMesh(solid, frame.number));
-    files.push_back(framePath(solid.file, frame.number));
-  }
-  if (purpose == FramePurpose::Picture) frame.blank = readSprites(scene, files);
-  stats.inputs = hashInputs(files);
-}
-
 /// The tree of the meshes that cast shadows.
 void prepareSolids(const Scene& scene, Frame& frame) {
   frame.solidTree = buildSolidTree(shadowTriangles(scene.solids, frame.meshes));
@@ -205,11 +183,20 @@ layout::uint endpointCode(Endpoint endpoint) {
 }
 
 Frame prepareFrame(Scene& scene, int number, FrameStats& stats, FramePurpose purpose) {
+  return prepareFrame(scene, loadFrame(scene, number, purpose), stats);
+}
+
+Frame prepareFrame(Scene& scene, FrameFiles files, FrameStats& stats) {
   Frame frame;
+  const int number = files.number;
   frame.number = stats.frame = number;
+  for (const std::string& warning : files.warnings) logWarning(warning);
+  frame.particles = std::move(files.particles);
+  frame.meshes = std::move(files.meshes);
+  frame.blank = std::move(files.sprites);
+  stats.inputs = std::move(files.inputs);
+  stats.seconds["load"] = files.seconds;
   Timer timer;
-  load(scene, purpose, frame, stats);
-  stats.seconds["load"] = timer.lap();
 
   prepareSolids(scene, frame);
   if (!scene.solids.empty()) stats.seconds["solids"] = timer.lap();

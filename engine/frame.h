@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/frame_files.h"
 #include "engine/stats.h"
 #include "host/lighting/approximate.h"
 #include "host/lighting/density_tree.h"
@@ -35,15 +36,14 @@ struct Frame {
   bool sampleById = true;    ///< false: too many particles share their ID, the index says which of them cast shadows
 };
 
-/// What a frame is made for: the light alone needs no sprites.
-enum class FramePurpose { Picture, Light };
-
 /// Loads and builds; fills `stats` (counts, radius, density scale, inputs; seconds of load, of octree with calibration
 /// and "auto" sub-sampling, and of solids for their tree).
 /// What the scene leaves open (a fitted camera, the default light, a density calibrated by optical depth) is settled by
 /// the first frame that is prepared and written into `scene`, so that a sequence neither jitters nor flickers.
 /// Throws InputError as readers and loaders do.
 Frame prepareFrame(Scene& scene, int number, FrameStats& stats, FramePurpose purpose = FramePurpose::Picture);
+/// … of files that are loaded.
+Frame prepareFrame(Scene& scene, FrameFiles files, FrameStats& stats);
 
 /// Shader codes of the scene's choices.
 layout::uint falloffCode(Falloff falloff);

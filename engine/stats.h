@@ -25,9 +25,9 @@ struct FrameStats {
   int frame = 1;
   std::size_t particles = 0, inOctree = 0, lights = 0;
   std::size_t drawn = 0;  ///< particles in view: sorted and splatted
-  /// Wall clock: load (particles, meshes, sprites, their sums), octree (with calibration and "auto" sub-sampling),
-  /// lighting (of particles and surfaces), sort, splat, write, total; solids (tree, camera rays, compositing) where
-  /// there are any.
+  /// Wall clock: load (particles, meshes, sprites, their sums; may have gone on while the frame before was drawn, and
+  /// is then no part of total), octree (with calibration and "auto" sub-sampling), lighting (of particles and
+  /// surfaces), sort, splat, write, total; solids (tree, camera rays, compositing) where there are any.
   std::map<std::string, double> seconds;
   std::map<std::string, double> deviceSeconds;  ///< the GPU's own clock (timestamps): lighting, sort, splat
   std::uint64_t deviceBytes = 0;                ///< most device memory held at once by one stage

@@ -216,6 +216,24 @@ TEST_F(Log, PrintsAndKeepsEachWarningOnceInOrder) {
   EXPECT_EQ(captured([] { logWarning("b"); }), "warning: b\n");
 }
 
+TEST_F(Log, KeepsAThreadsWarningsApartWhereAsked) {
+  std::vector<std::string> kept, inner;
+  const std::string text = captured([&] {
+    const WarningsKept keep(kept);
+    logWarning("a");
+    {
+      const WarningsKept again(inner);
+      logWarning("b");
+    }
+    logWarning("c");
+    std::thread([] { logWarning("other"); }).join();
+  });
+  EXPECT_EQ(text, "warning: other\n");
+  EXPECT_EQ(kept, (std::vector<std::string>{"a", "c"}));
+  EXPECT_EQ(inner, std::vector<std::string>{"b"});
+  EXPECT_EQ(takeWarnings(), std::vector<std::string>{"other"});
+}
+
 TEST_F(Log, TakesWarningsFromManyThreads) {
   setVerbosity(Verbosity::Quiet);
   std::vector<std::thread> threads;

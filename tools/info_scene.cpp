@@ -92,6 +92,7 @@ struct MemoryFacts {
   bool color, absorption, emission, velocity, id;
   bool moving;       ///< velocities are drawn
   bool rgb, solids;  ///< extinction that is not grey; solids that are seen
+  bool ahead;        ///< the next frame's particles load meanwhile
 
   MemoryFacts(double count, const std::vector<SourceFacts>& sources, const Scene& scene) {
     const auto any = [&](bool SourceFacts::*has) {
@@ -111,6 +112,7 @@ struct MemoryFacts {
     moving = velocity && (scene.output.velocity || scene.camera.shutter.x != scene.camera.shutter.y);
     const vec3& e = scene.medium.extinction;
     rgb = absorption || e.x != e.y || e.y != e.z;
+    ahead = scene.frames.first + scene.frames.step <= scene.frames.last && threadCount() > 1;
     solids = std::any_of(scene.solids.begin(), scene.solids.end(),
                          [](const Solid& solid) { return solid.mode != SolidMode::Hidden; });
   }
@@ -122,7 +124,8 @@ struct MemoryFacts {
 
 /// Bytes a particle on the host while the picture is drawn, which is when most is held.
 double particleBytes(const MemoryFacts& f, const Output& output) {
-  const double set = 12 + 4 + 4 + 4 + 12.0 * (f.color + f.absorption + f.emission + f.velocity) + 8.0 * f.id;
+  const double loaded = 12 + 4 + 4 + 12.0 * (f.color + f.absorption + f.emission + f.velocity) + 8.0 * f.id;
+  const double set = loaded * (f.ahead ? 2 : 1) + 4;  // and the optical depth through each
   const double tree = f.share * (6 * 4 + 8 * f.absorption + f.cellNodes) + (f.sampled() ? 5 * 4 : 0);
   const double sort = 8 + 4;                                                                 // (key, index) and order
   const double splats = f.splat() + 12.0 * f.absorption;                                     // and factors of colours

@@ -64,11 +64,15 @@ std::string stageSeconds(const FrameStats& stats) {
   return text;
 }
 
-void renderFrame(Scene& scene, int number, const RenderOptions& options, Renderer& renderer, RunStats& run) {
+/// Draws frame `number`; what follows it begins to load as soon as the scene is settled.
+void renderFrame(Scene& scene, int number, const RenderOptions& options, FrameLoader& loader, Renderer& renderer,
+                 RunStats& run) {
   FrameStats stats;
   Timer total;
   const std::string path = framePath(scene.output.file, number);
-  const Frame frame = prepareFrame(scene, number, stats);
+  const Frame frame = prepareFrame(scene, loader.take(number), stats);
+  const int next = number + scene.frames.step;
+  if (next <= scene.frames.last) loader.prefetch(next);
   const Image image = renderer.draw(frame, scene, renderer.light(frame, lightWanted(scene), stats), stats);
   Timer write;
   stats.warnings = takeWarnings();
@@ -96,8 +100,9 @@ void render(const RenderOptions& options, const CommonOptions& common) {
   run.raster = backends.gpuRaster ? "gpu" : "cpu";
   run.threads = threadCount();
   Renderer renderer(backends, gpu.get());
+  FrameLoader loader(scene);
   for (int number = scene.frames.first; number <= scene.frames.last; number += scene.frames.step)
-    renderFrame(scene, number, options, renderer, run);
+    renderFrame(scene, number, options, loader, renderer, run);
   requireNoValidationMessages(gpu.get());
   if (!options.stats.empty()) writeWholeFile(options.stats, statsJson(run));
 }

@@ -14,6 +14,7 @@ namespace {
 std::atomic<Verbosity> currentVerbosity{Verbosity::Normal};
 std::mutex warningMutex;
 std::vector<std::string> warnings;
+thread_local std::vector<std::string>* keptWarnings = nullptr;
 
 }  // namespace
 
@@ -29,6 +30,10 @@ void logVerbose(const std::string& line) {
 }
 
 void logWarning(const std::string& line) {
+  if (keptWarnings) {
+    keptWarnings->push_back(line);
+    return;
+  }
   const std::scoped_lock lock(warningMutex);
   if (std::find(warnings.begin(), warnings.end(), line) != warnings.end()) return;
   warnings.push_back(line);
@@ -39,6 +44,9 @@ std::vector<std::string> takeWarnings() {
   const std::scoped_lock lock(warningMutex);
   return std::exchange(warnings, {});
 }
+
+WarningsKept::WarningsKept(std::vector<std::string>& into) : before_(std::exchange(keptWarnings, &into)) {}
+WarningsKept::~WarningsKept() { keptWarnings = before_; }
 
 struct Progress::State {
   using Clock = std::chrono::steady_clock;

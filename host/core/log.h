@@ -24,6 +24,19 @@ void logWarning(const std::string& line);
 /// The warnings raised since the last call, in order; clears the list (also of what counts as printed).
 std::vector<std::string> takeWarnings();
 
+/// While it lives, warnings of the thread that made it go into its list, unprinted, instead of into the process'. Hand
+/// them to logWarning where they belong.
+class WarningsKept {
+ public:
+  explicit WarningsKept(std::vector<std::string>& into);
+  ~WarningsKept();
+  WarningsKept(const WarningsKept&) = delete;
+  WarningsKept& operator=(const WarningsKept&) = delete;
+
+ private:
+  std::vector<std::string>* before_;
+};
+
 /// A bar on a terminal, nothing elsewhere. Safe from any thread; `done` counts in the unit of `total`.
 class Progress {
  public:

@@ -130,6 +130,35 @@ TEST_F(MoteRender, WritesEveryFrameOfARange) {
   EXPECT_FALSE(readExr(folder_.file("p.0020.exr")).pixels == readExr(folder_.file("p.0030.exr")).pixels);
 }
 
+/// Frames load ahead of their turn: each still has its own particles, warnings and errors.
+TEST_F(MoteRender, FramesThatLoadAheadAreThoseRenderedAlone) {
+  ASSERT_EQ(
+      test::mote({"generate", "plume", "--count", "3000", "--frames", "1-3", "-o", folder_.file("p.#.prt")}).exitCode,
+      0);
+  writeBytes(folder_.file("p.2.prt"), readBytes(folder_.file("p.2.prt")) + "behind the end");
+  writeBytes(scene_, R"({"particles": [{"file": "p.#.prt"}], "medium": {"density_scale": 0.001},
+    "camera": {"position": [0, 1, 6], "target": [0, 1, 0]}, "lights": [{"name": "key", "position": [2, 3, 1]}],
+    "output": {"size": [48, 32]}})");
+  const std::string stats = folder_.file("s.json");
+  const ProcessResult all =
+      render({"--frames", "1-4", "-o", folder_.file("all.#.exr"), "--stats", stats, "--threads", "2"});
+  EXPECT_EQ(all.exitCode, 2);
+  EXPECT_TRUE(contains(all.err, "p.4.prt")) << all.err;
+  EXPECT_LT(all.err.find("frame 1:"), all.err.find("warning:")) << "said in its turn: " << all.err;
+  EXPECT_LT(all.err.find("frame 3:"), all.err.find("p.4.prt")) << all.err;
+  for (const char* threads : {"1", "2"})
+    ASSERT_EQ(
+        render({"--frames", "1-3", "-o", folder_.file("all.#.exr"), "--stats", stats, "--threads", threads}).exitCode,
+        0);
+  const json frames = json::parse(readBytes(stats))["frames"];
+  for (int frame = 1; frame <= 3; ++frame) {
+    EXPECT_EQ(frames[frame - 1]["warnings"].size(), frame == 2 ? 1u : 0u);
+    const std::string number = std::to_string(frame), alone = folder_.file("alone." + number + ".exr");
+    ASSERT_EQ(render({"--frames", number + "-" + number, "-o", alone}).exitCode, 0);
+    EXPECT_TRUE(readExr(folder_.file("all." + number + ".exr")).pixels == readExr(alone).pixels);
+  }
+}
+
 TEST_F(MoteRender, StatsHaveTheKeysOfTheContract) {
   const std::string ball = makeBall(folder_);
   ASSERT_EQ(render({"-o", folder_.file("out.exr"), "--stats", folder_.file("stats.json")}).exitCode, 0);

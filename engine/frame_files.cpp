@@ -1,0 +1,53 @@
+#include "engine/frame_files.h"
+
+#include <algorithm>
+
+#include "engine/splats.h"
+#include "host/core/log.h"
+#include "host/core/parallel.h"
+#include "host/core/sha256.h"
+#include "host/core/timer.h"
+#include "host/particles/particle_loader.h"
+#include "host/scene/frame_path.h"
+
+namespace mote {
+namespace {
+
+std::vector<FrameInput> hashInputs(const std::vector<std::string>& files) {
+  std::vector<FrameInput> inputs;
+  for (auto file = files.begin(); file != files.end(); ++file)
+    if (std::find(files.begin(), file, *file) == file) inputs.push_back({*file, sha256OfFile(*file)});
+  return inputs;
+}
+
+}  // namespace
+
+FrameFiles loadFrame(const Scene& scene, int number, FramePurpose purpose) {
+  FrameFiles files;
+  const WarningsKept keep(files.warnings);
+  const Timer timer;
+  files.number = number;
+  std::vector<std::string> paths;
+  files.particles = loadParticles(scene.particles, number, scene.medium.densityMode, &paths);
+  for (const Solid& solid : scene.solids) {
+    files.meshes.push_back(loadMesh(solid, number));
+    paths.push_back(framePath(solid.file, number));
+  }
+  if (purpose == FramePurpose::Picture) files.sprites = readSprites(scene, paths);
+  files.inputs = hashInputs(paths);
+  files.seconds = timer.seconds();
+  return files;
+}
+
+FrameFiles FrameLoader::take(int number) {
+  if (!next_.valid() || number_ != number) return loadFrame(scene_, number, purpose_);
+  return next_.get();
+}
+
+void FrameLoader::prefetch(int number) {
+  if (threadCount() < 2) return;
+  number_ = number;
+  next_ = std::async(std::launch::async, [this, number] { return loadFrame(scene_, number, purpose_); });
+}
+
+}  // namespace mote
