@@ -25,9 +25,11 @@ namespace {
 /// From a point of a column's frame, particles farther than this many least radii are placed in double.
 constexpr double kExactRadii = 128;
 
-/// Blocks of particles, a subgroup wide, that a column's list has on lavapipe. It ends a shader's loops after 65535
-/// steps altogether: a beam of 300 rays looks at a block 4 · 10 times at most, which leaves enough for the rest.
-constexpr std::uint32_t kMostBlocks = 1024;
+/// On lavapipe a column's list has this many particles times the square of the subgroup's width. It ends a shader's
+/// loops after 65535 steps altogether. Where every particle straddles every start, a beam of 320 rays takes a step for
+/// each group of as many rays as a subgroup has lanes, and for each block of as many particles: with subgroups of 4 or
+/// 8, 40960, which leaves enough for the rest; with wider ones less, as a list is no longer then and a group no larger.
+constexpr std::uint32_t kFoundPerLanes = 128;
 
 /// Points as (x, y, z, w) with w from `fourth`, interleaved in pieces: no second copy of all on the host.
 Buffer uploadPoints(const Device& device, const Receivers& points, std::span<const float> fourth) {
@@ -115,18 +117,17 @@ layout::LightRay rayOf(const BeamRays& rays, std::size_t k) {
 LightPass::Tuning LightPass::tuning(const Device& device) {
   Tuning t{};
   const std::uint32_t width = device.leastSubgroupSize();
-  if (std::getenv("AS_GPU") == nullptr && device.isCpu()) {
-    // lavapipe with subgroups of 8, times relative to these numbers on 1 M particles: packets of 16 rays 1.07, of 24
-    // 1.02, of 64 1.05 and twice as long to compile; columns of 2048 rays 1.1; beams of 192 1.1, of 320 the same.
+  if (device.isCpu()) {
+    // Measured on lavapipe (1 M rays of bench lighting, 256 bits), times relative to these: sets of 16 rays 1.07, of 24
+    // 1.02, of 64 1.05 and twice as long to compile; columns of 2048 rays 1.1; beams of 192 rays 1.1, of 320 the same.
     t.beams = {4096, 256};
     t.groupSize = device.subgroupSize();
     t.groupRays = std::min(8u, width), t.groups = std::min(4u, width);
-    // A shader has 65535 steps of loops. A beam has up to 320 rays: (320 / groupRays) · foundCapacity / width of them
-    // where every particle straddles every start, 40960 with this.
-    t.foundCapacity = std::min(knob("FOUND", 8192u), 128 * width * width);
-    t.chosenCapacity = std::min(knob("CHOSEN", 2048u), t.foundCapacity);
-    t.pieceColumns = knob("PCOLUMNS", 32), t.pieceBeams = 448, t.pieceRays = 1 << 17;
+    t.foundCapacity = std::min(8192u, kFoundPerLanes * width * width);
+    t.chosenCapacity = std::min(2048u, t.foundCapacity);
+    t.pieceColumns = 32, t.pieceBeams = 448, t.pieceRays = 1 << 17;
   } else {
+    // Not measured: few rays a set spare registers, many columns keep all of a device busy.
     t.beams = {1024, 256};
     t.groupSize = std::max(64u, device.mostSubgroupSize());
     t.groupRays = t.groups = std::min(4u, width);
@@ -289,7 +290,8 @@ std::vector<float> LightPass::run(const Piece& piece, float limit) {
   grow(to.walks, columns * sizeof(layout::LightWalk)), grow(to.beams, beams * sizeof(layout::LightBeam));
   grow(to.rays, rays * sizeof(layout::LightRay)), grow(to.depths, channels * rays * sizeof(float));
   grow(to.found, columns * layout::kFoundLists * t.foundCapacity * sizeof(vec4));
-  grow(to.order, columns * (layout::kOrderLists * t.foundCapacity + layout::kLightBins * (1 + device_.mostSubgroupSize())) *
+  grow(to.order, columns *
+                     (layout::kOrderLists * t.foundCapacity + layout::kLightBins * (1 + device_.mostSubgroupSize())) *
                      sizeof(layout::uint));
   grow(to.chosen, beams * layout::kChosenLists * t.chosenCapacity * sizeof(vec4));
   grow(to.chosenIndex, beams * layout::kChosenLists * t.chosenCapacity * sizeof(layout::uint));
