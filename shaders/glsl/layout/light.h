@@ -168,7 +168,7 @@ struct LightParams {
   MOTE_ADDRESS(LightRayBuffer) rays;
   MOTE_ADDRESS(FloatBuffer) opticalDepths;  // in and out, [channel][ray]: Σ τ before shadowDensity
   MOTE_ADDRESS(Vec4Buffer) found;           // scratch, [column][kFoundLists][capacity]
-  MOTE_ADDRESS(UintBuffer) order;           // scratch, [column]: [kOrderLists][capacity], [kLightBins], [kLightBins][widest subgroup]
+  MOTE_ADDRESS(UintBuffer) order;           // scratch, [column]: [kOrderLists][capacity], bins' ends, counters
   MOTE_ADDRESS(Vec4Buffer) chosen;          // scratch, [beam][kChosenLists][capacity]
   MOTE_ADDRESS(UintBuffer) chosenIndex;     // scratch, [beam][kChosenLists][capacity]
   uint nodeCount;
