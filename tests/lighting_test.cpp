@@ -221,10 +221,10 @@ TEST(Beams, TakeEverySlotOnceInBeamsOfColumns) {
     ASSERT_EQ(beams.start.back(), beams.receiver.size());
     for (std::size_t c = 0; c < beams.columns(); ++c) {
       ASSERT_LT(beams.column[c], beams.column[c + 1]);
-      ASSERT_LE(beams.ofColumn(c).size(), kColumnRays);
+      ASSERT_LE(beams.ofColumn(c).size(), BeamLimits{}.columnRays);
       for (std::size_t b = beams.column[c]; b < beams.column[c + 1]; ++b) {
         ASSERT_LT(beams.start[b], beams.start[b + 1]);
-        ASSERT_LE(beams.ofBeam(b).size(), kBeamRays + kBeamRays / 4);
+        ASSERT_LE(beams.ofBeam(b).size(), BeamLimits{}.beamRays * 5 / 4);
       }
     }
   }

@@ -1,12 +1,21 @@
-// Exact lighting in a compute shader: the walk of host/lighting over the same flattened tree, on the device.
+// Exact lighting in compute shaders: the columns and beams of host/lighting (beams.h, column.h, beam.h), on the device.
 //
-// One subgroup walks the tree as one packet of rays (see light.comp for why that suits hardware and lavapipe alike).
+// The host plans them and places the rays, in double. Then one subgroup a column walks the tree and lists what lies in
+// the column's way (light_gather.comp), and one subgroup a beam chooses from that and adds up (light_sum.comp). Lists
+// are of fixed length: where one is full, it is added up, and the walk goes on from there in the next dispatch.
+//
+// This suits hardware: nearly all loads are the same for a subgroup or side by side; branches are the subgroup's, none
+// a lane's; the inner loop works on registers alone; subgroups are independent, without shared memory, atomics or
+// barriers of a workgroup, and hundreds of columns and beams are under way at once. It suits lavapipe as well
+// (light_sum.comp says why).
+//
 // Every array is addressed by device address, so none is bound by maxStorageBufferRange.
 #pragma once
-#include <optional>
+#include <map>
 #include <vector>
 
 #include "engine/vulkan/device.h"
+#include "host/lighting/beams.h"
 #include "host/lighting/lighting.h"
 #include "host/octree/octree.h"
 
@@ -22,8 +31,8 @@ class LightPass {
   void setTree(const Octree& tree);
 
   /// As mote::opticalDepths for the tree that was set, with the rules of the constructor; T within 2e-5 of it for
-  /// cutoff 0. Needs on the device while it runs: 8 bytes a receiver (16 with three channels), and 20 more where the
-  /// receivers are not the tree's own slots.
+  /// cutoff 0. Needs on the device, beside the tree and however many receivers there are, about 70 MiB on CPU devices
+  /// and 600 MiB on others; on the host 16 bytes a receiver.
   std::vector<float> opticalDepths(const Receivers& receivers, const layout::Light& light,
                                    const LightingOptions& options, std::span<const std::uint8_t> reached = {},
                                    const RaysDone& done = {});
@@ -37,17 +46,47 @@ class LightPass {
   std::uint64_t deviceBytes() const { return deviceBytes_; }
 
  private:
-  const ComputePipeline& pipeline(bool ownSlots);
-  void dispatch(const ComputePipeline& pipeline, layout::LightParams params, std::size_t rays, const RaysDone& done);
+  /// What shaders are compiled for, beside the pass and the tree. `careful`: of any beam (gather), of the beam (sum).
+  struct GatherVariant {
+    bool perspective, careful, exact;
+    auto operator<=>(const GatherVariant&) const = default;
+  };
+  struct SumVariant {
+    bool perspective, careful, nearLight;
+    auto operator<=>(const SumVariant&) const = default;
+  };
+  /// Columns that are computed together: what the host has set up, and where it is on the device.
+  struct Piece {
+    std::vector<layout::LightColumn> columns;
+    std::vector<layout::vec4> planes;
+    std::vector<layout::LightBeam> plain, careful;
+    std::vector<layout::LightRay> rays;
+    std::vector<std::uint32_t> receivers;  ///< of the rays
+    bool perspective, exact, nearLight;
+  };
+  struct Buffers {
+    Buffer columns, planes, walks, beams, rays, depths, found, order, chosen, chosenIndex;
+    std::uint64_t bytes() const;
+  };
+  struct Tuning;
+  static Tuning tuning(const Device& device);
+
+  std::vector<SpecializationConstant> constants(bool perspective, bool careful) const;
+  const ComputePipeline& gather(const GatherVariant& variant);
+  const ComputePipeline& sum(const SumVariant& variant);
+  Piece setUp(const Receivers& receivers, const layout::Light& light, const Beams& beams, std::size_t first,
+              std::size_t last) const;
+  std::vector<float> run(const Piece& piece, float limit);
 
   const Device& device_;
   TimestampQueries queries_;
   layout::uint falloff_, endpoint_;
-  std::uint32_t raysPerGroup_;
   const Octree* tree_ = nullptr;
-  bool exact_ = false;                                // the tree spans so much that rays are rebased in double
-  std::optional<ComputePipeline> ownSlots_, others_;  // for receivers that are the tree's slots, and for any
-  Buffer nodes_, particles_, peaks_, peaksGreen_, peaksBlue_;
+  float greatestRadius_ = 0;
+  std::map<GatherVariant, ComputePipeline> gathers_;
+  std::map<SumVariant, ComputePipeline> sums_;
+  Buffer nodes_, particles_, peaks_;
+  Buffers buffers_;
   double deviceSeconds_ = 0;
   std::uint64_t deviceBytes_ = 0;
 };

@@ -66,7 +66,12 @@ Device::Device(VkPhysicalDevice physicalDevice, bool stageAlways)
       structure<VkPhysicalDeviceMaintenance4Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES);
   auto allocations =
       structure<VkPhysicalDeviceMaintenance3Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES);
+  auto subgroups = structure<VkPhysicalDeviceSubgroupProperties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES);
+  auto sizes = structure<VkPhysicalDeviceSubgroupSizeControlProperties>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_PROPERTIES);
   allocations.pNext = &buffers;
+  buffers.pNext = &subgroups;
+  subgroups.pNext = &sizes;
   auto properties = structure<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
   properties.pNext = &allocations;
   vkGetPhysicalDeviceProperties2(physicalDevice, &properties);
@@ -74,6 +79,9 @@ Device::Device(VkPhysicalDevice physicalDevice, bool stageAlways)
   cpu_ = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
   float64_ = shaderFloat64(physicalDevice) != VK_FALSE;
   limits_ = properties.properties.limits;
+  subgroupSize_ = subgroups.subgroupSize;
+  leastSubgroupSize_ = std::min(subgroups.subgroupSize, std::max(sizes.minSubgroupSize, 1u));
+  mostSubgroupSize_ = std::max(subgroups.subgroupSize, sizes.maxSubgroupSize);
   maxBuffer_ = buffers.maxBufferSize;
   maxAllocation_ = allocations.maxMemoryAllocationSize;
   vkGetPhysicalDeviceMemoryProperties(physicalDevice, &memory_);

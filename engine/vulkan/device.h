@@ -34,6 +34,10 @@ class Device {
   bool isCpu() const { return cpu_; }
   /// Double precision in shaders: optional, what needs it does without.
   bool hasFloat64() const { return float64_; }
+  /// Invocations a subgroup: what shaders usually get, and the least and most that a driver may choose.
+  std::uint32_t subgroupSize() const { return subgroupSize_; }
+  std::uint32_t leastSubgroupSize() const { return leastSubgroupSize_; }
+  std::uint32_t mostSubgroupSize() const { return mostSubgroupSize_; }
   const VkPhysicalDeviceLimits& limits() const { return limits_; }
   /// Largest buffer that can be made [bytes]; a bigger array must be streamed in parts.
   std::uint64_t maxBufferBytes() const;
@@ -89,6 +93,7 @@ class Device {
   bool stageAlways_;
   std::string name_;
   bool cpu_ = false, float64_ = false;
+  std::uint32_t subgroupSize_ = 0, leastSubgroupSize_ = 0, mostSubgroupSize_ = 0;
   VkPhysicalDeviceLimits limits_{};
   VkPhysicalDeviceMemoryProperties memory_{};
   std::uint64_t maxAllocation_ = 0, maxBuffer_ = 0;

@@ -80,8 +80,13 @@ void needSubgroups(VkPhysicalDevice device, std::vector<std::string>& missing) {
   properties.pNext = &subgroups;
   vkGetPhysicalDeviceProperties2(device, &properties);
   if (!(subgroups.supportedStages & VK_SHADER_STAGE_COMPUTE_BIT)) missing.push_back("subgroup operations in compute");
-  if (!(subgroups.supportedOperations & VK_SUBGROUP_FEATURE_BASIC_BIT)) missing.push_back("subgroup operations: basic");
-  if (!(subgroups.supportedOperations & VK_SUBGROUP_FEATURE_VOTE_BIT)) missing.push_back("subgroup operations: vote");
+  const auto need = [&](VkSubgroupFeatureFlagBits operations, const char* name) {
+    if (!(subgroups.supportedOperations & operations)) missing.push_back(fmt::format("subgroup operations: {}", name));
+  };
+  need(VK_SUBGROUP_FEATURE_BASIC_BIT, "basic");
+  need(VK_SUBGROUP_FEATURE_VOTE_BIT, "vote");
+  need(VK_SUBGROUP_FEATURE_BALLOT_BIT, "ballot");
+  need(VK_SUBGROUP_FEATURE_ARITHMETIC_BIT, "arithmetic");
 }
 
 void needFormats(VkPhysicalDevice device, std::vector<std::string>& missing) {

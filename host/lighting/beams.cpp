@@ -140,15 +140,20 @@ std::vector<std::size_t> splitEvenly(Crossing* begin, Crossing* end, float lo, f
 /// Cuts ranges of crossings into columns and beams and marks where each begins.
 class Cutter {
  public:
-  Cutter(const Receivers& receivers, const Faces& faces, double radius, std::vector<std::uint8_t>& begins,
-         const Crossing* all)
-      : receivers_(receivers), faces_(faces), radius_(static_cast<float>(radius)), begins_(begins), all_(all) {}
+  Cutter(const Receivers& receivers, const Faces& faces, double radius, const BeamLimits& limits,
+         std::vector<std::uint8_t>& begins, const Crossing* all)
+      : receivers_(receivers),
+        faces_(faces),
+        radius_(static_cast<float>(radius)),
+        limits_(limits),
+        begins_(begins),
+        all_(all) {}
 
   void cutIntoColumns(Crossing* begin, Crossing* end) const {
     const auto count = static_cast<std::size_t>(end - begin);
     if (count == 0) return;
     const CellGrid box = boxOf(begin, end);
-    if (count == 1 || (count <= kColumnRays && box.width() <= kWidestColumn * radiusAt(*begin))) {
+    if (count == 1 || (count <= limits_.columnRays && box.width() <= kWidestColumn * radiusAt(*begin))) {
       mark(begin) |= kColumnBegins;
       cutIntoStrips(begin, end, box);
       return;
@@ -168,7 +173,7 @@ class Cutter {
   /// Strips across u, beams along each (sort-tile-recursive), nearly square and of equal count.
   void cutIntoStrips(Crossing* begin, Crossing* end, const CellGrid& box) const {
     const auto count = static_cast<std::size_t>(end - begin);
-    const std::size_t beams = (count + kBeamRays - 1) / kBeamRays;
+    const std::size_t beams = (count + limits_.beamRays - 1) / limits_.beamRays;
     const vec2 size = glm::max(box.hi - box.lo, vec2(1e-30f));
     const double across = std::sqrt(static_cast<double>(beams) * size.x / size.y);
     const std::size_t strips = std::clamp<std::size_t>(static_cast<std::size_t>(across + 0.5), 1, beams);
@@ -176,8 +181,8 @@ class Cutter {
     for (std::size_t s = 0; s + 1 < starts.size(); ++s) {
       Crossing *strip = begin + starts[s], *stripEnd = begin + starts[s + 1];
       const std::size_t inStrip = starts[s + 1] - starts[s];
-      const auto pieces =
-          splitEvenly<&Crossing::v>(strip, stripEnd, box.lo.y, box.hi.y, (inStrip + kBeamRays - 1) / kBeamRays);
+      const auto pieces = splitEvenly<&Crossing::v>(strip, stripEnd, box.lo.y, box.hi.y,
+                                                    (inStrip + limits_.beamRays - 1) / limits_.beamRays);
       for (std::size_t p = 0; p + 1 < pieces.size(); ++p) cutIntoBeams(strip + pieces[p], strip + pieces[p + 1]);
     }
   }
@@ -186,7 +191,8 @@ class Cutter {
   void cutIntoBeams(Crossing* begin, Crossing* end) const {
     const auto count = static_cast<std::size_t>(end - begin);
     const CellGrid box = boxOf(begin, end);
-    if (count == 1 || (count <= kBeamRays + kBeamRays / 4 && box.width() <= kWidestBeam * radiusAt(*begin))) {
+    if (count == 1 ||
+        (count <= limits_.beamRays + limits_.beamRays / 4 && box.width() <= kWidestBeam * radiusAt(*begin))) {
       mark(begin) |= kBeamBegins;
       return;
     }
@@ -209,6 +215,7 @@ class Cutter {
   const Receivers& receivers_;
   const Faces& faces_;
   float radius_;
+  BeamLimits limits_;
   std::vector<std::uint8_t>& begins_;
   const Crossing* all_;
 };
@@ -278,12 +285,12 @@ CountedCells countIntoCells(const Receivers& receivers, const Faces& faces, std:
 }  // namespace
 
 Beams planBeams(const Receivers& receivers, const layout::Light& light, std::span<const std::uint8_t> reached,
-                double typicalRadius) {
+                double typicalRadius, const BeamLimits& limits) {
   const Faces faces(light, receivers.bounds().centre());
   CountedCells cells = countIntoCells(receivers, faces, reached);
   if (cells.crossings.empty()) return {};
   std::vector<std::uint8_t> begins(cells.crossings.size(), 0);
-  const Cutter cutter(receivers, faces, typicalRadius, begins, cells.crossings.data());
+  const Cutter cutter(receivers, faces, typicalRadius, limits, begins, cells.crossings.data());
   parallelBlocks(cells.start.size() - 1, 1, [&](std::size_t cell, std::size_t) {
     cutter.cutIntoColumns(cells.crossings.data() + cells.start[cell], cells.crossings.data() + cells.start[cell + 1]);
   });

@@ -9,10 +9,12 @@
 
 namespace mote {
 
-/// Most rays of a beam, and of a column of beams. What lies in a column's way is found once for all of its rays, and
-/// each beam chooses from it: wide enough that finding costs little, narrow enough that little of what is chosen misses
-/// a ray.
-constexpr std::size_t kBeamRays = 256, kColumnRays = 4096;
+/// Most rays of a column of beams, and of a beam (a quarter more where they are cut unevenly). What lies in a column's
+/// way is found once for all of its rays, and each beam chooses from it: wide enough that finding costs little, narrow
+/// enough that little of what is chosen misses a ray. The numbers are those for TBB.
+struct BeamLimits {
+  std::size_t columnRays = 4096, beamRays = 256;
+};
 
 /// Receivers, grouped.
 struct Beams {
@@ -34,11 +36,11 @@ struct Beams {
 
 /// Groups the receivers whose `reached` is not 0 (empty: all) by where their rays cross the plane of a directional
 /// light, or one of the six faces of a cube around a point light. Halves of equal count, across the wider side, until a
-/// column has at most kColumnRays rays and a beam at most kBeamRays, and neither is wider than a few times
+/// column has at most columnRays rays and a beam at most beamRays, and neither is wider than a few times
 /// `typicalRadius` [scene units] (or they have one ray): wider ones would find far more than their rays meet. None of a
 /// point light is wider than a face. The result depends on nothing but the arguments. About 15 ms per million on two
 /// cores; 16 bytes a ray while it runs.
 Beams planBeams(const Receivers& receivers, const layout::Light& light, std::span<const std::uint8_t> reached,
-                double typicalRadius);
+                double typicalRadius, const BeamLimits& limits = {});
 
 }  // namespace mote

@@ -139,6 +139,14 @@ TEST_F(LightPassTest, LightsAnyPointsInThreeColoursAndOnlyThoseReached) {
   EXPECT_LE(worst, 2e-5);
 }
 
+TEST_F(LightPassTest, GoesOnWhereTheListOfAColumnIsFull) {
+  const Octree tree = ballTree(20000, 0.2, 0.2, 2, 0, {0, 0, 0});
+  EXPECT_LE(worstTransmittance(tree, pointLight({0, 6, 0}), 0, layout::kEndpointSoft, 0), 2e-5);
+  EXPECT_LE(worstTransmittance(tree, directionalLight({0, 0, 1}), 0, layout::kEndpointSoft, 0), 2e-5);
+  // Nearly all are near this one, in the list's other end.
+  EXPECT_LE(worstTransmittance(tree, pointLight({0, 0, 0}), 0, layout::kEndpointClamp, 0), 2e-5);
+}
+
 TEST_F(LightPassTest, SplitsMoreRaysThanOneSubmissionTakes) {
   const Octree tree = ballTree(150000, 0.02, 0.02, 2, 0, {0, 0, 0});
   EXPECT_LE(worstTransmittance(tree, pointLight({3, 0, 0}), 0, 0, 1e-4f), 1e-4);
