@@ -14,16 +14,12 @@
 
 namespace mote {
 
-/// Most particles of a leaf: the rule of "particles_per_cell": "auto", measured. Seconds of lighting on TBB relative to
-/// 64, means over clouds, plumes and balls of 0.1–1 M particles, radii of 1, 1.5 and 3 spacings, lights near and far:
-///              16     32     64    128    256    512   1024
-///   AVX-512   1.6    1.25   1     0.96   0.93   0.93   0.94
-///   AVX2      1.45   1.2    1     0.98   0.97   1.1    –
-///   SSE4      1.35   1.15   1     0.94   0.94   0.95   –
-/// The optimum is flat and moves neither with the number of particles nor with their overlap. (Measured when every
-/// sixteen rays walked the tree; columns walk it once for thousands.) The compute shader, which
-/// then tested the particles of a leaf one after the other, wanted 16–64 (256: 1.1–1.6 on lavapipe); now it tests a
-/// subgroup's width at once. So it is 64 for both.
+/// Most particles of a leaf: the rule of "particles_per_cell": "auto", measured. Seconds of exact lighting on TBB
+/// (AVX-512, noise cloud of 1 M, three lights, least of six runs in turn) relative to 64:
+///     16     32     64     128    256    512
+///     1.04   1.02   1      0.97   0.96   0.96
+/// A column walks the tree once for thousands of rays, so it hardly matters; larger leaves make boxes of nodes coarser
+/// for those who test a subgroup's width of particles at once.
 constexpr std::uint32_t kDefaultParticlesPerCell = 64;
 
 /// Arrays of particles are this much longer than particleCount(), so that vector loads may run over the end.
