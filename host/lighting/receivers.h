@@ -11,8 +11,8 @@ namespace mote {
 /// "No slot": a receiver that is no particle of the tree leaves nothing out of its sum.
 constexpr std::uint32_t kNoSlot = 0xffffffffu;
 
-/// Views of arrays that somebody else owns. Neighbours in the arrays should be neighbours in space (Morton order), which
-/// is kind to caches.
+/// Views of arrays that somebody else owns. Neighbours in the arrays should be neighbours in space (Morton order),
+/// which is kind to caches.
 struct Receivers {
   std::span<const float> x, y, z;  ///< where they are [scene units]; all of one length
   std::span<const std::uint32_t>
