@@ -6,8 +6,8 @@
 //
 // This suits hardware: nearly all loads are the same for a subgroup or side by side; branches are the subgroup's, none
 // a lane's; the inner loop works on registers alone; subgroups are independent, without shared memory, atomics or
-// barriers of a workgroup, and hundreds of columns and beams are under way at once. It suits lavapipe as well
-// (light_sum.comp says why).
+// barriers of a workgroup, and hundreds of columns and beams are under way at once. (So it should; it was measured on
+// lavapipe alone, for which light_sum.comp says why it is as it is.)
 //
 // Every array is addressed by device address, so none is bound by maxStorageBufferRange.
 #pragma once
@@ -31,8 +31,8 @@ class LightPass {
   void setTree(const Octree& tree);
 
   /// As mote::opticalDepths for the tree that was set, with the rules of the constructor; T within 2e-5 of it for
-  /// cutoff 0. Needs on the device, beside the tree and however many receivers there are, about 70 MiB on CPU devices
-  /// and 600 MiB on others; on the host 16 bytes a receiver.
+  /// cutoff 0. Needs on the device, beside the tree and however many receivers there are, about 65 MiB on CPU devices
+  /// and 500 MiB on others; on the host 16 bytes a receiver.
   std::vector<float> opticalDepths(const Receivers& receivers, const layout::Light& light,
                                    const LightingOptions& options, std::span<const std::uint8_t> reached = {},
                                    const RaysDone& done = {});

@@ -17,7 +17,7 @@ spec.loader.exec_module(plot_scaling)
 
 def run(series, count, seconds_a, ratio, passed=True):
     return {"name": "%s, %d" % (series, count), "count": count, "count_a": 1000, "a": "on 1000 particles", "b": series,
-            "seconds_a": seconds_a, "core_seconds_a": [1, 1], "core_seconds_b": [4, 4],
+            "seconds_a": seconds_a, "core_seconds_a": [2e-3, 2e-3], "core_seconds_b": [8e-3, 8e-3],
             "ratio_median": ratio, "ratio_min": ratio / 2, "ratio_max": 2 * ratio,
             "check": {"text": "", "passed": passed}}
 
@@ -52,6 +52,7 @@ class PlotScalingTest(unittest.TestCase):
                          [("grid", 1000), ("grid", 2000), ("grid", 4000), ("grid & co", 1000), ("grid & co", 2000)])
         self.assertEqual([float(row["ns_per_particle"]) for row in rows], [100, 100, 150, 1000, 1000])
         self.assertEqual([float(row["relative"]) for row in rows], [1, 1, 1.5, 1, 1])
+        self.assertEqual([float(row["cpu_ns_per_particle"]) for row in rows], [2000, 4000, 2000, 2000, 4000])
         self.assertEqual([float(row["relative_cpu"]) for row in rows], [1, 2, 1, 1, 2])
         self.assertEqual((float(rows[2]["relative_min"]), float(rows[2]["relative_max"])), (0.75, 3))
 
@@ -67,7 +68,17 @@ class PlotScalingTest(unittest.TestCase):
         self.assertAlmostEqual(points[1][0] - points[0][0], points[2][0] - points[1][0], delta=0.2)  # doublings
         self.assertEqual(points[0][1], points[1][1])
         self.assertLess(points[2][1], points[1][1])
+        self.assertIn("ns per particle", [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")])
         self.assertIn("grid & co", [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")])
+
+    def test_PlotsCpuTimeWhereThatIsAskedFor(self):
+        self.plot(REPORT, "--svg", self.path("plot.svg"), "--csv", self.path("plot.csv"), "--cpu")
+        root = xml.etree.ElementTree.parse(self.path("plot.svg")).getroot()
+        self.assertIn("CPU ns per particle", [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")])
+        points = root.find("{http://www.w3.org/2000/svg}polyline").get("points").split()
+        heights = [float(point.split(",")[1]) for point in points]
+        self.assertLess(heights[1], heights[0])
+        self.assertEqual(heights[2], heights[0])
 
     def test_LeavesOutWhatFailedItsCheck(self):
         failed = {"benchmark": "scaling",

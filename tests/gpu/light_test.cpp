@@ -15,18 +15,28 @@ constexpr layout::uint kEndpoints[] = {layout::kEndpointSoft, layout::kEndpointC
 
 /// Uniform in the unit ball with log-uniform radii, some at equal positions, one at `light`.
 Octree ballTree(std::size_t count, double least, double greatest, double opticalDepth, layout::uint falloff,
-                const vec3& light) {
+                const vec3& light, const vec3& centre = vec3(0)) {
   std::vector<vec3> position;
   std::vector<float> radius, density;
   for (std::size_t i = 0; i < count; ++i) {
     Random random(21, i);
-    position.emplace_back(random.direction() * std::cbrt(random.uniform()));
+    position.emplace_back(centre + vec3(random.direction() * std::cbrt(random.uniform())));
     radius.push_back(static_cast<float>(least * std::pow(greatest / least, random.uniform())));
     density.push_back(static_cast<float>(opticalDepth * 4.0 / 3.0 * kPi / static_cast<double>(count)));
     if (i % 50 == 1) position[i] = position[i - 1];
   }
   if (count > 10) position[7] = light;
   return buildOctree(position, radius, peakOpticalDepths(density, radius, falloff, true, 1));
+}
+
+/// Green and blue of their own for each particle.
+void colour(Octree& tree) {
+  tree.peakGreen = tree.peakBlue = tree.peak;
+  for (std::size_t slot = 0; slot < tree.particleCount(); ++slot) {
+    Random random(31, slot);
+    tree.peakGreen[slot] *= static_cast<float>(random.uniform(0, 2));
+    tree.peakBlue[slot] *= static_cast<float>(random.uniform(0, 0.2));
+  }
 }
 
 class LightPassTest : public GpuTest {
@@ -72,6 +82,28 @@ TEST_F(LightPassTest, AgreesForRadiiOverThreeDecades) {
   EXPECT_LE(worst, 2e-5);
 }
 
+TEST_F(LightPassTest, AgreesInThreeColoursFromWithinAndFarFromTheOrigin) {
+  double worst = 0;
+  for (const vec3& centre : {vec3(0), vec3(1000, -2000, 500)}) {
+    const vec3 inside = centre + vec3(0.2f, 0.1f, -0.3f);
+    Octree tree = ballTree(20000, 0.02, 0.2, 2, layout::kFalloffSmooth, inside, centre);
+    colour(tree);
+    for (const layout::Light& light :
+         {pointLight(inside), pointLight(centre + vec3(0, 4, 0)), directionalLight({0.3f, -1, 0.2f})})
+      worst = std::max(worst, worstTransmittance(tree, light, layout::kFalloffSmooth, layout::kEndpointSoft, 0));
+  }
+  std::printf("worst |dT| in RGB, radii 10:1, also far from the origin: %.2e\n", worst);
+  EXPECT_LE(worst, 2e-5);
+}
+
+TEST_F(LightPassTest, GivesTheSameBitsEveryTime) {
+  const Octree tree = ballTree(20000, 0.05, 0.2, 4, layout::kFalloffSmooth, {0, 0, 0});
+  LightPass pass(device(), layout::kFalloffSmooth, layout::kEndpointSoft);
+  pass.setTree(tree);
+  const std::vector<float> first = pass.opticalDepths(pointLight({2, 3, 1}), {});
+  for (int again = 0; again < 3; ++again) EXPECT_EQ(pass.opticalDepths(pointLight({2, 3, 1}), {}), first);
+}
+
 TEST_F(LightPassTest, StopsEarlyWithinTheCutoff) {
   const Octree tree = ballTree(20000, 0.05, 0.05, 30, layout::kFalloffSmooth, {0, 0, 0});
   // Where both stop, both transmittances lie between the true one and the cutoff.
@@ -100,14 +132,12 @@ TEST_F(LightPassTest, GivesNothingForNoParticlesAndZerosWithoutShadows) {
 TEST_F(LightPassTest, LightsAnyPointsInThreeColoursAndOnlyThoseReached) {
   const Octree grey = ballTree(5000, 0.05, 0.15, 2, layout::kFalloffSmooth, {0.2f, 0.1f, -0.3f});
   Octree tree = grey;
-  tree.peakGreen = tree.peakBlue = tree.peak;
+  colour(tree);
   std::vector<float> x, y, z;
   std::vector<std::uint32_t> self;
   std::vector<std::uint8_t> reached;
   for (std::size_t slot = 0; slot < tree.particleCount(); ++slot) {
-    Random random(31, slot);
-    tree.peakGreen[slot] *= static_cast<float>(random.uniform(0, 2));
-    tree.peakBlue[slot] *= static_cast<float>(random.uniform(0, 0.2));
+    Random random(32, slot);
     // Every other receiver is the slot's particle, the rest are points of no particle, some far outside.
     const bool particle = slot % 2 == 0;
     const vec3 point = particle ? tree.position(slot) : vec3(random.direction() * random.uniform(0, 20));

@@ -25,7 +25,7 @@ constexpr std::uint64_t kScalarMost = 20'000;  // particles lit on the scalar pa
 
 constexpr double kRadiusRange = 10;  // greatest / least, where radii vary
 
-constexpr double kMostBuildSeconds = 0.2, kLeastRays = 1.0, kLeastAgainstPlain = 2.5, kMostRatio = 12;  // the floors
+constexpr double kMostBuildSeconds = 0.2, kLeastRays = 1.0, kLeastAgainstPlain = 2.5, kMostRatio = 5;  // the floors
 
 /// What buildOctree takes.
 struct Cloud {

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Table and plot of a report of `mote bench scaling`: time per particle against the number of particles.
 
-  tools/bench/plot_scaling.py REPORT.json [--csv OUT.csv] [--svg OUT.svg]
+  tools/bench/plot_scaling.py REPORT.json [--csv OUT.csv] [--svg OUT.svg] [--cpu]
 
 Every cloud was timed in turn with the smallest one, so its time per particle is the median of the ratios times that of
-the smallest, which is the median over the whole report. relative_cpu is of the CPU time over all threads, which others
-on the machine disturb least. Standard library only.
+the smallest, which is the median over the whole report. The columns with cpu are of the CPU time over all threads,
+which others on the machine disturb least; --cpu plots that. Standard library only.
 Exit code: 0, 2 where the report is not one of `mote bench scaling` or has not been timed.
 """
 import argparse
@@ -20,7 +20,8 @@ from xml.sax.saxutils import escape
 WIDTH, HEIGHT = 640, 400
 LEFT, RIGHT, TOP, BOTTOM = 70, 190, 20, 50  # margins; the right one holds the legend
 COLOURS = ["#1b6ca8", "#c0392b", "#2e7d32", "#7b1fa2"]
-COLUMNS = ["series", "particles", "ns_per_particle", "relative", "relative_min", "relative_max", "relative_cpu"]
+COLUMNS = ["series", "particles", "ns_per_particle", "relative", "relative_min", "relative_max",
+           "cpu_ns_per_particle", "relative_cpu"]
 
 
 class ReportError(Exception):
@@ -39,14 +40,15 @@ def rows_of(report):
         rows = []
         for name, runs in series.items():
             smallest = runs[0]["count_a"]
-            nanoseconds = statistics.median(s for run in runs for s in run["seconds_a"]) / smallest * 1e9
-            rows.append([name, smallest, nanoseconds, 1.0, 1.0, 1.0, 1.0])
+            wall, cpu = (statistics.median(s for run in runs for s in run[key]) / smallest * 1e9
+                         for key in ("seconds_a", "core_seconds_a"))
+            rows.append([name, smallest, wall, 1.0, 1.0, 1.0, cpu, 1.0])
             for run in runs:
                 scale = run["count_a"] / run["count"]
                 ratio, least, most = (run[key] * scale for key in ("ratio_median", "ratio_min", "ratio_max"))
                 core_a, core_b = (statistics.median(run[key]) for key in ("core_seconds_a", "core_seconds_b"))
-                cpu = core_b / core_a * scale if core_a > 0 else math.nan
-                rows.append([name, run["count"], ratio * nanoseconds, ratio, least, most, cpu])
+                ratio_cpu = core_b / core_a * scale if core_a > 0 else math.nan
+                rows.append([name, run["count"], ratio * wall, ratio, least, most, ratio_cpu * cpu, ratio_cpu])
     except (KeyError, TypeError, IndexError, statistics.StatisticsError) as error:
         raise ReportError("not a report of mote bench scaling: %s %s" % (type(error).__name__, error)) from error
     if not rows:
@@ -67,9 +69,10 @@ def count_text(count):
     return "%g M" % (count / 1e6) if count >= 1e5 else "%g k" % (count / 1e3)
 
 
-def to_svg(rows):
+def to_svg(rows, column="ns_per_particle"):
+    value = COLUMNS.index(column)
     counts = sorted({row[1] for row in rows})
-    least, most = min(row[2] for row in rows), max(row[2] for row in rows)
+    least, most = min(row[value] for row in rows), max(row[value] for row in rows)
     # Whole decades about the times.
     low, high = math.floor(math.log10(least)), max(math.ceil(math.log10(most)), math.floor(math.log10(least)) + 1)
 
@@ -98,12 +101,12 @@ def to_svg(rows):
         line(x(count), TOP, x(count), HEIGHT - BOTTOM, "#eee")
         text(x(count), HEIGHT - BOTTOM + 18, count_text(count))
     text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 12, "particles")
-    parts.append('<text transform="translate(18 %.1f) rotate(-90)" text-anchor="middle">ns per particle</text>'
-                 % ((TOP + HEIGHT - BOTTOM) / 2))
+    parts.append('<text transform="translate(18 %.1f) rotate(-90)" text-anchor="middle">%s</text>'
+                 % ((TOP + HEIGHT - BOTTOM) / 2, column.replace("cpu", "CPU").replace("_", " ")))
     names = list(dict.fromkeys(row[0] for row in rows))
     for index, name in enumerate(names):
         colour = COLOURS[index % len(COLOURS)]
-        points = [(x(row[1]), y(row[2])) for row in rows if row[0] == name]
+        points = [(x(row[1]), y(row[value])) for row in rows if row[0] == name]
         parts.append('<polyline fill="none" stroke="%s" stroke-width="2" points="%s"/>'
                      % (colour, " ".join("%.1f,%.1f" % point for point in points)))
         parts += ['<circle cx="%.1f" cy="%.1f" r="3" fill="%s"/>' % (*point, colour) for point in points]
@@ -118,13 +121,15 @@ def main(*arguments):
     parser.add_argument("report", metavar="REPORT.json")
     parser.add_argument("--csv", metavar="OUT.csv", help="write the table there; else it is printed")
     parser.add_argument("--svg", metavar="OUT.svg", help="write the plot there")
+    parser.add_argument("--cpu", action="store_true", help="plot CPU time over all threads")
     options = parser.parse_args(arguments)
     try:
         with open(options.report, encoding="utf-8") as file:
             rows = rows_of(json.load(file))
         if options.csv is None:
             sys.stdout.write(to_csv(rows))
-        for path, content in ((options.csv, to_csv(rows)), (options.svg, to_svg(rows))):
+        plot = to_svg(rows, "cpu_ns_per_particle" if options.cpu else "ns_per_particle")
+        for path, content in ((options.csv, to_csv(rows)), (options.svg, plot)):
             if path is not None:
                 with open(path, "w", encoding="utf-8") as file:
                     file.write(content)
