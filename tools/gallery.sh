@@ -70,9 +70,10 @@ shrink() {
   [[ $small -eq 1 ]] || return 0
   count=$(grep -o 'particles/0/count=[0-9]*' <<<"$flags" | cut -d= -f2 || true)
   if [[ -z "$count" ]]; then count=$(grep -o '"count": *[0-9]*' "$scene" | grep -o '[0-9]*$' | head -1 || true); fi
-  printf -- '--size 240x135'
-  if [[ -n "$count" ]]; then printf -- ' --set /particles/0/count=%d' $((count / 10)); fi
+  if [[ -n "$count" ]]; then printf -- '--set /particles/0/count=%d' $((count / 10)); fi
 }
+size=960x540
+if [[ $small -eq 1 ]]; then size=240x135; fi
 
 out=out/gallery
 mkdir -p "$out"
@@ -88,7 +89,7 @@ for entry in "${gallery[@]}"; do
   fi
   from=$(date +%s.%N)
   # shellcheck disable=SC2046,SC2086  # flags are words
-  "$mote" render "$scene" --size 960x540 -o "$out/$name.exr" --preview "$out/$name.png" --stats "$out/$name.json" \
+  "$mote" render "$scene" --size "$size" -o "$out/$name.exr" --preview "$out/$name.png" --stats "$out/$name.json" \
     $flags $(shrink "$scene" "$flags")
   printf '%s %.1f\n' "$name" "$(echo "$(date +%s.%N) $from" | awk '{print $1 - $2}')" >>"$seconds_file"
   sheet+=(-label "${caption//%/%%}" "$out/$name.png")
