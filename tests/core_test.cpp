@@ -1,4 +1,5 @@
-// What every module stands on: files that appear whole or not at all, messages, random numbers, hashes, blocks, boxes.
+// What every module stands on: files that appear whole or not at all, messages, random numbers, hashes, blocks, bins,
+// boxes.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -14,6 +15,7 @@
 #include <set>
 #include <thread>
 
+#include "host/core/bins.h"
 #include "host/core/error.h"
 #include "host/core/log.h"
 #include "host/core/output_file.h"
@@ -403,6 +405,29 @@ TEST(ParallelBlocks, AreTheSameForAnyNumberOfThreads) {
       }
     }
   }
+}
+
+TEST(SortIntoBins, KeepsTheOrderWithinEachBinForAnyNumberOfThreads) {
+  for (const std::size_t count : {0, 1, 63, 64, 65, 10'000})
+    for (const std::size_t bins : {1, 7, 300}) {
+      // An input gives none, one or two items.
+      const auto each = [&](std::size_t begin, std::size_t end, const auto& put) {
+        for (std::size_t i = begin; i < end; ++i)
+          for (std::size_t copy = 0; copy < i % 3; ++copy) put(hashBits(copy, i) % bins, 2 * i + copy);
+      };
+      std::vector<std::vector<std::size_t>> expected(bins);
+      each(0, count, [&](std::size_t bin, std::size_t item) { expected[bin].push_back(item); });
+      Binned<std::size_t> binned;
+      for (const unsigned threads : {1u, 2u, 7u}) {
+        const ThreadLimit limit(threads);
+        sortIntoBins(count, bins, each, binned);
+        ASSERT_EQ(binned.bins(), bins);
+        for (std::size_t bin = 0; bin < bins; ++bin)
+          ASSERT_EQ(std::vector<std::size_t>(binned.of(bin).begin(), binned.of(bin).end()), expected[bin]);
+      }
+    }
+  const auto nothing = [](std::size_t, std::size_t, const auto&) {};
+  EXPECT_TRUE(sortIntoBins<int>(10, 0, nothing).items.empty());
 }
 
 TEST(ThreadLimitTest, HoldsWhileItLives) {

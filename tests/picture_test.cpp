@@ -294,6 +294,22 @@ void writeBall(const std::string& path) {
   writePrt(path, columns);
 }
 
+/// The layers of lights and emission, added up, must be the picture; returns the brightest channel of a pixel.
+double brightestOfLayersThatSumToThePicture(const Image& image) {
+  double brightest = 0;
+  std::size_t wrong = 0;
+  for (std::size_t p = 0; p < image.pixels.size(); ++p)
+    for (int c = 0; c < 3; ++c) {
+      double sum = 0;
+      for (const ImageLayer& one : image.layers)
+        if (one.name.back() == "RGB"[c]) sum += one.values[p];
+      wrong += !(std::abs(sum - image.pixels[p][c]) <= 2e-6 + 2e-6 * image.pixels[p][c]);
+      brightest = std::max(brightest, sum);
+    }
+  EXPECT_EQ(wrong, 0u);
+  return brightest;
+}
+
 TEST_F(Picture, LightLayersAndEmissionSumToTheBeauty) {
   writeBall(folder.file("particles.prt"));
   const Image image = render(std::string(kCamera) +
@@ -305,17 +321,10 @@ TEST_F(Picture, LightLayersAndEmissionSumToTheBeauty) {
                                            {"name": "s", "file": "square.obj", "mode": "holdout", "translate": [-1.2, 0, -0.1]}],
                                 "output": {"size": [96, 64], "aovs": ["lights"]})");
   ASSERT_EQ(image.layers.size(), 12u);
-  double brightest = 0, emitted = 0;
-  for (std::size_t p = 0; p < image.pixels.size(); ++p)
-    for (int c = 0; c < 3; ++c) {
-      double sum = 0;
-      for (const ImageLayer& one : image.layers)
-        if (one.name.back() == "RGB"[c]) sum += one.values[p];
-      ASSERT_NEAR(sum, image.pixels[p][c], 2e-6 + 2e-6 * image.pixels[p][c]) << p << ' ' << c;
-      brightest = std::max(brightest, sum);
-      emitted += layer(image, fmt::format("emission.{}", "RGB"[c])).values[p];
-    }
-  EXPECT_GT(brightest, 0.1);
+  EXPECT_GT(brightestOfLayersThatSumToThePicture(image), 0.1);
+  double emitted = 0;
+  for (const char* name : {"emission.R", "emission.G", "emission.B"})
+    for (const float value : layer(image, name).values) emitted += value;
   EXPECT_GT(emitted, 1);
 }
 
@@ -327,13 +336,7 @@ TEST_F(Picture, LightLayersOfAPlainSceneSumToTheBeautyToo) {
                                            {"name": "b", "position": [-2, 2, 1], "intensity": 30}],
                                 "output": {"size": [96, 64], "aovs": ["lights", "Z", "velocity", "optical_depth"]})");
   ASSERT_EQ(image.layers.size(), 6u);
-  for (std::size_t p = 0; p < image.pixels.size(); ++p)
-    for (int c = 0; c < 3; ++c) {
-      double sum = 0;
-      for (const ImageLayer& one : image.layers)
-        if (one.name.back() == "RGB"[c]) sum += one.values[p];
-      ASSERT_NEAR(sum, image.pixels[p][c], 2e-6 + 2e-6 * image.pixels[p][c]);
-    }
+  EXPECT_GT(brightestOfLayersThatSumToThePicture(image), 0.1);
   EXPECT_EQ(image.alpha.size(), image.pixels.size());
   EXPECT_EQ(image.velocity.size(), image.pixels.size());
   EXPECT_EQ(image.opticalDepth.size(), image.pixels.size());
@@ -353,16 +356,7 @@ TEST_F(Picture, DrawsOnlyParticlesInView) {
   const Image image = seen("[0.2, 0.1, 0]");
   EXPECT_GT(drawn, 0u);
   EXPECT_LT(drawn, frame.particles.size() / 2);
-  double brightest = 0;
-  for (std::size_t p = 0; p < image.pixels.size(); ++p)
-    for (int c = 0; c < 3; ++c) {
-      double sum = 0;
-      for (const ImageLayer& one : image.layers)
-        if (one.name.back() == "RGB"[c]) sum += one.values[p];
-      ASSERT_NEAR(sum, image.pixels[p][c], 2e-6 + 2e-6 * image.pixels[p][c]);
-      brightest = std::max(brightest, sum);
-    }
-  EXPECT_GT(brightest, 0.01);
+  EXPECT_GT(brightestOfLayersThatSumToThePicture(image), 0.01);
   const Image elsewhere = seen("[0, 0, 9]");
   EXPECT_EQ(drawn, 0u);
   for (const vec4& pixel : elsewhere.pixels) ASSERT_EQ(pixel, vec4(0));

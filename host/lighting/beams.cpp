@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "host/core/parallel.h"
+#include "host/core/bins.h"
 
 namespace mote {
 namespace {
@@ -220,13 +220,8 @@ class Cutter {
   const Crossing* all_;
 };
 
-/// All crossings, cell after cell, and where each cell begins.
-struct CountedCells {
-  std::vector<Crossing> crossings;
-  std::vector<std::size_t> start;
-};
-
-CountedCells countIntoCells(const Receivers& receivers, const Faces& faces, std::span<const std::uint8_t> reached) {
+/// All crossings, cell after cell.
+Binned<Crossing> sortIntoCells(const Receivers& receivers, const Faces& faces, std::span<const std::uint8_t> reached) {
   const std::size_t count = receivers.size(), block = std::max<std::size_t>((count + kBlocks - 1) / kBlocks, 1);
   const auto each = [&](std::size_t begin, std::size_t end, const auto& body) {
     for (std::size_t k = begin; k < end; ++k) {
@@ -257,29 +252,9 @@ CountedCells countIntoCells(const Receivers& receivers, const Faces& faces, std:
     cells += grids[face].columns * grids[face].rows;
     rays += onFace;
   }
-  if (rays == 0) return {};
-  const auto cellOf = [&](std::uint8_t face, const Crossing& ray) { return grids[face].cell(ray.u, ray.v); };
-
-  // How many of each block go into each cell, then where they go: the same order for any number of threads.
-  std::vector<std::size_t> place(kBlocks * cells, 0);
-  parallelBlocks(count, block, [&](std::size_t begin, std::size_t end) {
-    std::size_t* counts = &place[begin / block * cells];
-    each(begin, end, [&](std::uint8_t face, const Crossing& ray) { ++counts[cellOf(face, ray)]; });
+  return sortIntoBins<Crossing>(count, cells, [&](std::size_t begin, std::size_t end, const auto& put) {
+    each(begin, end, [&](std::uint8_t face, const Crossing& ray) { put(grids[face].cell(ray.u, ray.v), ray); });
   });
-  CountedCells result;
-  result.crossings.resize(rays);
-  std::size_t at = 0;
-  for (std::size_t cell = 0; cell < cells; ++cell) {
-    result.start.push_back(at);
-    for (std::size_t b = 0; b < kBlocks; ++b) at += std::exchange(place[b * cells + cell], at);
-  }
-  result.start.push_back(at);
-  parallelBlocks(count, block, [&](std::size_t begin, std::size_t end) {
-    std::size_t* places = &place[begin / block * cells];
-    each(begin, end,
-         [&](std::uint8_t face, const Crossing& ray) { result.crossings[places[cellOf(face, ray)]++] = ray; });
-  });
-  return result;
 }
 
 }  // namespace
@@ -287,19 +262,19 @@ CountedCells countIntoCells(const Receivers& receivers, const Faces& faces, std:
 Beams planBeams(const Receivers& receivers, const layout::Light& light, std::span<const std::uint8_t> reached,
                 double typicalRadius, const BeamLimits& limits) {
   const Faces faces(light, receivers.bounds().centre());
-  CountedCells cells = countIntoCells(receivers, faces, reached);
-  if (cells.crossings.empty()) return {};
-  std::vector<std::uint8_t> begins(cells.crossings.size(), 0);
-  const Cutter cutter(receivers, faces, typicalRadius, limits, begins, cells.crossings.data());
-  parallelBlocks(cells.start.size() - 1, 1, [&](std::size_t cell, std::size_t) {
-    cutter.cutIntoColumns(cells.crossings.data() + cells.start[cell], cells.crossings.data() + cells.start[cell + 1]);
+  Binned<Crossing> cells = sortIntoCells(receivers, faces, reached);
+  if (cells.items.empty()) return {};
+  std::vector<std::uint8_t> begins(cells.items.size(), 0);
+  const Cutter cutter(receivers, faces, typicalRadius, limits, begins, cells.items.data());
+  parallelBlocks(cells.bins(), 1, [&](std::size_t cell, std::size_t) {
+    cutter.cutIntoColumns(cells.items.data() + cells.start[cell], cells.items.data() + cells.start[cell + 1]);
   });
   Beams beams;
-  beams.receiver.resize(cells.crossings.size());
-  for (std::size_t i = 0; i < cells.crossings.size(); ++i) {
+  beams.receiver.resize(cells.items.size());
+  for (std::size_t i = 0; i < cells.items.size(); ++i) {
     if (begins[i] & kColumnBegins) beams.column.push_back(static_cast<std::uint32_t>(beams.start.size()));
     if (begins[i] & kBeamBegins) beams.start.push_back(static_cast<std::uint32_t>(i));
-    beams.receiver[i] = cells.crossings[i].receiver;
+    beams.receiver[i] = cells.items[i].receiver;
   }
   beams.column.push_back(static_cast<std::uint32_t>(beams.start.size()));
   beams.start.push_back(static_cast<std::uint32_t>(beams.receiver.size()));

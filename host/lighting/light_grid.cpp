@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include "host/core/bins.h"
 #include "host/core/cap.h"
 #include "host/core/error.h"
 #include "host/core/falloff.h"
-#include "host/core/parallel.h"
 #include "host/lighting/beam_kernel.h"
 #include "host/lighting/grid_tile.h"
 
@@ -15,7 +15,6 @@ namespace mote {
 namespace {
 
 /// Receivers are counted into tiles by this many blocks.
-constexpr std::size_t kBlocks = 64;
 constexpr std::uint64_t kNoTile = ~std::uint64_t{0};
 
 /// The faces of a light: one plane, or the six of a cube along the world's axes.
@@ -73,30 +72,28 @@ std::uint64_t tileOf(const vec3& point, const std::vector<LightFrame>& faces, do
                      std::floor(v / tileSize));
 }
 
-/// The distinct keys, ascending, with what each block of receivers has of them.
-struct Census {
-  std::vector<std::uint64_t> keys;
-  std::size_t block;
-};
-
-Census takeCensus(const std::vector<std::uint64_t>& keyOf) {
-  Census census{{}, std::max<std::size_t>((keyOf.size() + kBlocks - 1) / kBlocks, 1)};
-  std::vector<std::vector<std::uint64_t>> parts(kBlocks);
-  parallelBlocks(keyOf.size(), census.block, [&](std::size_t begin, std::size_t end) {
-    std::vector<std::uint64_t>& part = parts[begin / census.block];
+/// The distinct keys, ascending.
+std::vector<std::uint64_t> distinct(const std::vector<std::uint64_t>& keyOf) {
+  constexpr std::size_t kGrain = 1 << 16;
+  std::vector<std::vector<std::uint64_t>> parts((keyOf.size() + kGrain - 1) / kGrain);
+  const auto ascendingOnce = [](std::vector<std::uint64_t>& keys) {
+    std::sort(keys.begin(), keys.end());
+    keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  };
+  parallelBlocks(keyOf.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint64_t>& part = parts[begin / kGrain];
     std::uint64_t last = kNoTile;
     for (std::size_t k = begin; k < end; ++k)
       if (keyOf[k] != last && keyOf[k] != kNoTile) part.push_back(last = keyOf[k]);
-    std::sort(part.begin(), part.end());
-    part.erase(std::unique(part.begin(), part.end()), part.end());
+    ascendingOnce(part);
   });
-  for (const auto& part : parts) census.keys.insert(census.keys.end(), part.begin(), part.end());
-  std::sort(census.keys.begin(), census.keys.end());
-  census.keys.erase(std::unique(census.keys.begin(), census.keys.end()), census.keys.end());
-  return census;
+  std::vector<std::uint64_t> keys;
+  for (const auto& part : parts) keys.insert(keys.end(), part.begin(), part.end());
+  ascendingOnce(keys);
+  return keys;
 }
 
-/// Counts the receivers of each tile and writes them there, block by block: the same for any number of threads.
+/// The receivers tile by tile.
 TilePlan planTiles(const Receivers& receivers, const std::vector<LightFrame>& faces, double cell,
                    std::span<const std::uint8_t> reached) {
   std::vector<std::uint64_t> keyOf(receivers.size(), kNoTile);
@@ -104,39 +101,24 @@ TilePlan planTiles(const Receivers& receivers, const std::vector<LightFrame>& fa
     for (std::size_t k = begin; k < end; ++k)
       if (reached.empty() || reached[k] != 0) keyOf[k] = tileOf(receivers.position(k), faces, cell * kTileCells);
   });
-  const Census census = takeCensus(keyOf);
-  const std::size_t tiles = census.keys.size();
-  const auto each = [&](std::size_t begin, std::size_t end, const auto& body) {
+  const std::vector<std::uint64_t> keys = distinct(keyOf);
+  const auto each = [&](std::size_t begin, std::size_t end, const auto& put) {
     std::uint64_t last = kNoTile;
     std::size_t tile = 0;
     for (std::size_t k = begin; k < end; ++k) {
       if (keyOf[k] == kNoTile) continue;
       if (keyOf[k] != last) {
         last = keyOf[k];
-        tile = static_cast<std::size_t>(std::lower_bound(census.keys.begin(), census.keys.end(), last) -
-                                        census.keys.begin());
+        tile = static_cast<std::size_t>(std::lower_bound(keys.begin(), keys.end(), last) - keys.begin());
       }
-      body(tile, k);
+      put(tile, static_cast<std::uint32_t>(k));
     }
   };
-  std::vector<std::uint32_t> place(kBlocks * tiles, 0);
-  parallelBlocks(keyOf.size(), census.block, [&](std::size_t begin, std::size_t end) {
-    std::uint32_t* counts = place.data() + begin / census.block * tiles;
-    each(begin, end, [&](std::size_t tile, std::size_t) { ++counts[tile]; });
-  });
+  Binned<std::uint32_t> binned = sortIntoBins<std::uint32_t>(keyOf.size(), keys.size(), each);
   TilePlan plan;
-  std::uint32_t at = 0;
-  for (std::size_t tile = 0; tile < tiles; ++tile) {
-    const std::uint32_t begin = at;
-    for (std::size_t b = 0; b < kBlocks; ++b) at += std::exchange(place[b * tiles + tile], at);
-    plan.tiles.push_back(TileKey::tile(census.keys[tile], begin, at));
-  }
-  plan.receiver.resize(at);
-  parallelBlocks(keyOf.size(), census.block, [&](std::size_t begin, std::size_t end) {
-    std::uint32_t* places = place.data() + begin / census.block * tiles;
-    each(begin, end,
-         [&](std::size_t tile, std::size_t k) { plan.receiver[places[tile]++] = static_cast<std::uint32_t>(k); });
-  });
+  for (std::size_t tile = 0; tile < keys.size(); ++tile)
+    plan.tiles.push_back(TileKey::tile(keys[tile], binned.start[tile], binned.start[tile + 1]));
+  plan.receiver = std::move(binned.items);
   return plan;
 }
 

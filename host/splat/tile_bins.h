@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/core/parallel.h"
+#include "host/core/bins.h"
 #include "host/splat/tile_kernel.h"
 
 namespace mote {
@@ -39,42 +39,8 @@ struct Tiling {
   }
 };
 
-/// The splats of each tile, in drawing order.
-struct Bins {
-  std::vector<std::size_t> first;    ///< a tile's first item; one more entry ends the last
-  std::vector<std::uint32_t> items;  ///< indices into the splats
-};
-
-/// Counting sort of the run [begin, end) by tile: blocks count, one scan gives every (tile, block) its place, blocks
-/// fill.
-template <class S>
-void fillBins(const std::vector<S>& splats, std::size_t begin, std::size_t end, const Tiling& tiling, Bins& bins) {
-  constexpr std::size_t kBinBlocks = 64;  // that are binned side by side; each needs a counter for every tile
-  const std::size_t tiles = tiling.count(), grain = (end - begin + kBinBlocks - 1) / kBinBlocks;
-  std::vector<std::uint32_t> places(kBinBlocks * tiles, 0);
-  parallelBlocks(end - begin, grain, [&](std::size_t from, std::size_t to) {
-    std::uint32_t* mine = places.data() + from / grain * tiles;
-    for (std::size_t i = from; i < to; ++i) tiling.forEach(splats[begin + i], [&](std::size_t tile) { ++mine[tile]; });
-  });
-  bins.first.resize(tiles + 1);
-  std::uint32_t place = 0;  // the pairs of a run fit: one splat touches fewer than 2¹⁸ tiles, a run else kMaxPairs
-  for (std::size_t tile = 0; tile < tiles; ++tile) {
-    bins.first[tile] = place;
-    for (std::size_t block = 0; block < kBinBlocks; ++block) {
-      const std::uint32_t count = places[block * tiles + tile];
-      places[block * tiles + tile] = place;
-      place += count;
-    }
-  }
-  bins.first[tiles] = place;
-  bins.items.resize(place);
-  parallelBlocks(end - begin, grain, [&](std::size_t from, std::size_t to) {
-    std::uint32_t* mine = places.data() + from / grain * tiles;
-    for (std::size_t i = from; i < to; ++i)
-      tiling.forEach(splats[begin + i],
-                     [&](std::size_t tile) { bins.items[mine[tile]++] = static_cast<std::uint32_t>(begin + i); });
-  });
-}
+/// The splats of each tile, in drawing order. A run's fit: a splat touches fewer than 2¹⁸ tiles.
+using Bins = Binned<std::uint32_t>;
 
 /// Bins all splats in runs of at most kMaxPairs pairs and calls drawTile(tile, items, count) for each tile that has
 /// some, tiles side by side, runs one after the other.
@@ -86,10 +52,14 @@ void forEachTile(const std::vector<S>& splats, const Tiling& tiling, Bins& bins,
       pairs += tiling.touched(splats[end]);
       if (pairs > kMaxPairs && end > begin) break;
     }
-    fillBins(splats, begin, end, tiling, bins);
+    const auto each = [&](std::size_t from, std::size_t to, const auto& put) {
+      for (std::size_t i = begin + from; i < begin + to; ++i)
+        tiling.forEach(splats[i], [&](std::size_t tile) { put(tile, static_cast<std::uint32_t>(i)); });
+    };
+    sortIntoBins(end - begin, tiling.count(), each, bins);
     tbb::parallel_for(std::size_t{0}, tiling.count(), [&](std::size_t tile) {
-      const std::size_t first = bins.first[tile], count = bins.first[tile + 1] - first;
-      if (count > 0) drawTile(tile, bins.items.data() + first, count);
+      const std::span<const std::uint32_t> items = bins.of(tile);
+      if (!items.empty()) drawTile(tile, items.data(), items.size());
     });
   }
 }

@@ -4,14 +4,12 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "host/core/error.h"
 #include "host/core/log.h"
 #include "host/core/output_file.h"
 #include "host/core/parallel.h"
-#include "host/core/timer.h"
 #include "host/lighting/beam_kernel.h"
 #include "tools/render.h"
 
@@ -42,14 +40,9 @@ void runOnce(const Contender& contender) {
   contender.work();
 }
 
-/// Appends the wall-clock seconds and the CPU seconds, over all threads, of one run.
-void time(const Contender& contender, std::vector<double>& seconds, std::vector<double>& core) {
+void time(const Contender& contender, RunTimes& times) {
   if (contender.prepare) contender.prepare();
-  const std::clock_t coreStart = std::clock();
-  const Timer timer;
-  contender.work();
-  seconds.push_back(timer.seconds());
-  core.push_back(static_cast<double>(std::clock() - coreStart) / CLOCKS_PER_SEC);
+  times.time(contender.work);
 }
 
 /// "0.0986 s (0.0981 .. 0.1204)": median, least and greatest.
@@ -70,10 +63,10 @@ void print(const Comparison& comparison) {
     fmt::print("  {}      {:<39} {:>13}  {:<32}  {:.4g} core-s\n", letter, name,
                rate(static_cast<double>(count), median(seconds)), spread(seconds, " s"), median(core));
   };
-  if (!comparison.secondsA.empty())
-    contender('A', comparison.a, comparison.countA, comparison.secondsA, comparison.coreA);
-  if (comparison.secondsB.empty()) return;
-  contender('B', comparison.b, comparison.countB, comparison.secondsB, comparison.coreB);
+  if (!comparison.timesA.wall.empty())
+    contender('A', comparison.a, comparison.countA, comparison.timesA.wall, comparison.timesA.core);
+  if (comparison.timesB.wall.empty()) return;
+  contender('B', comparison.b, comparison.countB, comparison.timesB.wall, comparison.timesB.core);
   fmt::print("  B / A  {}\n", spread(comparison.ratios(), ""));
 }
 
@@ -89,21 +82,13 @@ Json toJson(const Comparison& comparison) {
                {"count_a", comparison.countA},
                {"a", comparison.a},
                {"b", nullptr},
-               {"ratio_median", nullptr},
-               {"ratio_min", nullptr},
-               {"ratio_max", nullptr},
-               {"seconds_a", comparison.secondsA},
-               {"seconds_b", comparison.secondsB},
-               {"core_seconds_a", comparison.coreA},
-               {"core_seconds_b", comparison.coreB},
+               {"seconds_a", comparison.timesA.wall},
+               {"seconds_b", comparison.timesB.wall},
+               {"core_seconds_a", comparison.timesA.core},
+               {"core_seconds_b", comparison.timesB.core},
                {"check", {{"text", comparison.check.text}, {"passed", comparison.check.passed}}}};
   if (!comparison.b.empty()) json["b"] = comparison.b;
-  if (const std::vector<double> ratios = comparison.ratios(); !ratios.empty()) {
-    const auto [least, greatest] = std::minmax_element(ratios.begin(), ratios.end());
-    json["ratio_median"] = median(ratios);
-    json["ratio_min"] = *least;
-    json["ratio_max"] = *greatest;
-  }
+  setRatios(json, comparison.ratios());
   return json;
 }
 
@@ -116,22 +101,6 @@ Json toJson(const Floor& floor) {
 }
 
 }  // namespace
-
-double median(std::vector<double> values) {
-  MOTE_CHECK(values.size(), >, 0u);
-  std::sort(values.begin(), values.end());
-  const std::size_t middle = values.size() / 2;
-  return values.size() % 2 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
-}
-
-double Comparison::medianA() const { return median(secondsA); }
-double Comparison::medianB() const { return median(secondsB); }
-
-std::vector<double> Comparison::ratios() const {
-  std::vector<double> ratios;
-  for (std::size_t run = 0; run < secondsB.size(); ++run) ratios.push_back(secondsB[run] / secondsA[run]);
-  return ratios;
-}
 
 Bench::Bench(const std::string& name, const BenchOptions& options, const CommonOptions& common)
     : name_(name), options_(options) {
@@ -168,8 +137,8 @@ const Comparison* Bench::compare(const std::string& name, const std::string& uni
   progress.advance(1);
   comparison.check = check();
   for (int run = 0; run < options_.runs && comparison.check.passed; ++run) {
-    time(a, comparison.secondsA, comparison.coreA);
-    if (b) time(*b, comparison.secondsB, comparison.coreB);
+    time(a, comparison.timesA);
+    if (b) time(*b, comparison.timesB);
     progress.advance(1);
   }
   print(comparison);

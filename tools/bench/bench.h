@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/vulkan/gpu.h"
+#include "tools/bench/timing.h"
 #include "tools/command.h"
 
 namespace mote {
@@ -42,12 +43,12 @@ struct Comparison {
   std::uint64_t countA = 0, countB = 0;
   std::string a, b;
   BenchCheck check;
-  std::vector<double> secondsA, secondsB;  ///< wall clock
-  std::vector<double> coreA, coreB;        ///< the process' CPU time: what others' load on the machine disturbs least
+  RunTimes timesA, timesB;
 
-  double medianA() const, medianB() const;
-  /// secondsB / secondsA, pair by pair.
-  std::vector<double> ratios() const;
+  double medianA() const { return median(timesA.wall); }
+  double medianB() const { return median(timesB.wall); }
+  /// B / A, pair by pair.
+  std::vector<double> ratios() const { return pairwiseRatios(timesB, timesA); }
 };
 
 /// A figure that must be reached at the benchmark's own count; printed and reported, never a failure.
@@ -58,8 +59,6 @@ struct Floor {
 
   bool reached() const { return atLeast ? value >= limit : value <= limit; }
 };
-
-double median(std::vector<double> values);
 
 class Bench {
  public:

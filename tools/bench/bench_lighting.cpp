@@ -8,18 +8,15 @@
 #include "host/core/parallel.h"
 #include "host/core/random.h"
 #include "host/lighting/lighting.h"
-#include "host/lighting/medium.h"
 #include "host/octree/octree.h"
-#include "host/particles/generate.h"
-#include "host/particles/spacing.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/bench_cloud.h"
 #include "tools/bench/plain_packets.h"
 
 namespace mote {
 namespace {
 
 constexpr std::uint64_t kSeed = 0;
-constexpr double kOpticalDepth = 4;            // as the default of a scene
 constexpr double kRounding = 2e-5;             // |ΔT| that is left without a cutoff, as in mote crosscheck
 constexpr std::uint64_t kScalarMost = 20'000;  // particles lit on the scalar path too: a fraction of a second
 
@@ -27,43 +24,8 @@ constexpr double kRadiusRange = 10;  // greatest / least, where radii vary
 
 constexpr double kMostBuildSeconds = 0.2, kLeastRays = 1.0, kLeastAgainstPlain = 2.5, kMostRatio = 5;  // the floors
 
-/// What buildOctree takes.
-struct Cloud {
-  std::vector<vec3> position;
-  std::vector<float> radius, peak;
-};
-
-/// Radii of 1.5 spacings, or spread log-uniformly over a range about that.
-Cloud makeCloud(std::uint64_t count, layout::uint falloff, double range = 1) {
-  ParticleSet set = generateParticles(Generator::Cloud, count, kSeed, 1);
-  Cloud cloud;
-  cloud.position = std::move(set.position);
-  const double radius = kAutoRadiusFactor * meanNeighbourDistance(cloud.position);
-  cloud.radius.resize(count);
-  for (std::size_t i = 0; i < count; ++i)
-    cloud.radius[i] = static_cast<float>(radius * std::pow(range, uniformDouble(hashBits(kSeed, i, 1)) - 0.5));
-  cloud.peak = peakOpticalDepths(set.density, cloud.radius, falloff, true, 1);
-  const Octree tree = buildOctree(cloud.position, cloud.radius, cloud.peak);
-  const auto scale = static_cast<float>(kOpticalDepth / meanLineOpticalDepth(tree, falloff));
-  for (float& peak : cloud.peak) peak *= scale;
-  return cloud;
-}
-
-/// Outside of the cloud, which lies within [-1, 1]³.
-layout::Light pointLight() {
-  return {.position = vec3(2, 3, 1),
-          .type = layout::kLightPoint,
-          .direction = vec3(0),
-          .decay = 2,
-          .power = vec3(60),
-          .shadowDensity = 1,
-          .castsShadows = 1,
-          .cosInner = 1,
-          .cosOuter = -1};
-}
-
 /// The build, with the sort of as many numbers beside it: a yardstick of the machine's speed at that moment.
-Octree timeBuild(Bench& bench, const Cloud& cloud) {
+Octree timeBuild(Bench& bench, const BenchCloud& cloud) {
   std::vector<std::uint64_t> numbers;
   Octree tree;
   const Contender sort{.name = "tbb::parallel_sort of 64-bit numbers",
@@ -73,9 +35,8 @@ Octree timeBuild(Bench& bench, const Cloud& cloud) {
                              numbers.resize(cloud.position.size());
                              for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = hashBits(kSeed, i);
                            }};
-  const Contender build{.name = "octree build",
-                        .work = [&] { tree = buildOctree(cloud.position, cloud.radius, cloud.peak); },
-                        .prepare = [&] { tree = Octree(); }};
+  const Contender build{
+      .name = "octree build", .work = [&] { tree = cloud.tree(); }, .prepare = [&] { tree = Octree(); }};
   const Comparison* times = bench.compare("octree build", "particles", sort, build, [&]() -> BenchCheck {
     const std::string broken = validate(tree, kDefaultParticlesPerCell);
     return {broken.empty() ? "the tree keeps every promise of its layout" : broken, broken.empty()};
@@ -88,8 +49,8 @@ Octree timeBuild(Bench& bench, const Cloud& cloud) {
 
 /// The SIMD path against the scalar one on a smaller cloud, bit for bit.
 BenchCheck scalarCheck(std::uint64_t count, const layout::Light& light, const LightingOptions& options) {
-  const Cloud cloud = makeCloud(std::min(count, kScalarMost), options.falloff);
-  const Octree tree = buildOctree(cloud.position, cloud.radius, cloud.peak);
+  const BenchCloud cloud = benchCloud(std::min(count, kScalarMost), options.falloff);
+  const Octree tree = cloud.tree();
   const bool same = opticalDepths(tree, light, options) == opticalDepthsScalar(tree, light, options);
   return {fmt::format("SIMD {} the scalar path on {} particles", same ? "equals" : "is not", tree.particleCount()),
           same};
@@ -119,14 +80,14 @@ BenchCheck both(const BenchCheck& first, const BenchCheck& second) {
 void addFloors(Bench& bench, const Comparison& times) {
   bench.addFloor(
       {"lighting on TBB [M rays/s]", static_cast<double>(bench.count()) / times.medianA() * 1e-6, kLeastRays, true});
-  if (!times.secondsB.empty())
+  if (!times.timesB.wall.empty())
     bench.addFloor({"lighting in compute / on TBB [time]", median(times.ratios()), kMostRatio});
 }
 
-void againstPlainPackets(Bench& bench, const std::string& name, const Cloud& cloud, const layout::Light& light,
+void againstPlainPackets(Bench& bench, const std::string& name, const BenchCloud& cloud, const layout::Light& light,
                          const LightingOptions& options) {
-  const Octree tree = buildOctree(cloud.position, cloud.radius, cloud.peak);
-  const Octree fine = buildOctree(cloud.position, cloud.radius, cloud.peak, kPlainPacketLeaf);
+  const Octree tree = cloud.tree();
+  const Octree fine = cloud.tree(kPlainPacketLeaf);
   std::vector<float> beams, packets;
   const Contender ours{"lighting on TBB", [&] { beams = opticalDepths(tree, light, options); }};
   const Contender plain{"plain packets of 16 rays", [&] { packets = plainPacketDepths(fine, light, options); }};
@@ -141,12 +102,12 @@ void againstPlainPackets(Bench& bench, const std::string& name, const Cloud& clo
 
 void benchLighting(Bench& bench) {
   const LightingOptions options;
-  const layout::Light light = pointLight();
-  const Cloud cloud = makeCloud(bench.count(), options.falloff);
+  const layout::Light light = benchLight();
+  const BenchCloud cloud = benchCloud(bench.count(), options.falloff);
   const Octree tree = timeBuild(bench, cloud);
   againstPlainPackets(bench, "exact, equal radii", cloud, light, options);
-  againstPlainPackets(bench, "exact, radii 10:1", makeCloud(bench.count(), options.falloff, kRadiusRange), light,
-                      options);
+  againstPlainPackets(bench, "exact, radii 10:1", benchCloud(bench.count(), options.falloff, {.range = kRadiusRange}),
+                      light, options);
 
   std::vector<float> onHost, onDevice;
   const Contender host{"lighting on TBB", [&] { onHost = opticalDepths(tree, light, options); }};

@@ -9,11 +9,9 @@
 #include "host/core/parallel.h"
 #include "host/core/random.h"
 #include "host/lighting/approximate.h"
-#include "host/lighting/medium.h"
 #include "host/octree/octree.h"
-#include "host/particles/generate.h"
-#include "host/particles/spacing.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/bench_cloud.h"
 
 namespace mote {
 namespace {
@@ -21,46 +19,10 @@ namespace {
 constexpr std::uint64_t kSeed = 0;
 constexpr int kDoublings = 6;          // 0.5 M to 32 M
 constexpr int kMiddle = 3;             // doublings at whose spacing the radius is 1.5: of 4 M particles
-constexpr double kOpticalDepth = 4;    // as the default of a scene
 constexpr double kError = 0.01;        // mean |ΔT|
 constexpr double kRounding = 2e-5;     // |ΔT| that is left without a cutoff, as in mote crosscheck
 constexpr std::uint64_t kProbes = 32;  // rays summed over all particles: seconds at 32 M
 constexpr double kMostRise = 1.3;      // the floor
-
-/// What buildOctree takes.
-struct Cloud {
-  std::vector<vec3> position;
-  std::vector<float> radius, peak;
-  std::uint64_t count() const { return position.size(); }
-};
-
-/// `radius` of all particles; 0: such that it is 1.5 spacings of a cloud of 2^kMiddle as many.
-Cloud makeCloud(std::uint64_t count, float radius, layout::uint falloff) {
-  ParticleSet set = generateParticles(Generator::Cloud, count, kSeed, 1);
-  Cloud cloud;
-  cloud.position = std::move(set.position);
-  if (radius == 0)
-    radius = static_cast<float>(kAutoRadiusFactor * meanNeighbourDistance(cloud.position) * std::exp2(-kMiddle / 3.0));
-  cloud.radius.assign(count, radius);
-  cloud.peak = peakOpticalDepths(set.density, cloud.radius, falloff, true, 1);
-  const Octree tree = buildOctree(cloud.position, cloud.radius, cloud.peak);
-  const auto scale = static_cast<float>(kOpticalDepth / meanLineOpticalDepth(tree, falloff));
-  for (float& peak : cloud.peak) peak *= scale;
-  return cloud;
-}
-
-/// Outside of the cloud, which lies within [-1, 1]³.
-layout::Light pointLight() {
-  return {.position = vec3(2, 3, 1),
-          .type = layout::kLightPoint,
-          .direction = vec3(0),
-          .decay = 2,
-          .power = vec3(60),
-          .shadowDensity = 1,
-          .castsShadows = 1,
-          .cosInner = 1,
-          .cosOuter = -1};
-}
 
 /// Optical depth from a slot to the point light, falloff smooth and soft ends, in double over every particle.
 double bruteForceDepth(const Octree& tree, std::size_t slot, const layout::Light& light) {
@@ -116,14 +78,15 @@ BenchCheck withinError(const std::vector<float>& found, const std::vector<float>
 /// The ways timed, for one cloud.
 class Lit {
  public:
-  Lit(Cloud cloud, const LightingOptions& options) : cloud_(std::move(cloud)), options_(options), light_(pointLight()) {
+  Lit(BenchCloud cloud, const LightingOptions& options)
+      : cloud_(std::move(cloud)), options_(options), light_(benchLight()) {
     build();
   }
 
   std::uint64_t count() const { return cloud_.count(); }
   float radius() const { return cloud_.radius.front(); }
 
-  void build() { tree_ = buildOctree(cloud_.position, cloud_.radius, cloud_.peak); }
+  void build() { tree_ = cloud_.tree(); }
   void lightExactly() { exact_ = opticalDepths(tree_, light_, options_); }
   void lightWithin() {
     found_ = approximateOpticalDepths(tree_, slotsOf(tree_), light_, options_, {.mean = kError}, chosen_);
@@ -138,7 +101,7 @@ class Lit {
   BenchCheck checkWithin() const { return withinError(found_, exact_, light_, chosen_); }
 
  private:
-  Cloud cloud_;
+  BenchCloud cloud_;
   LightingOptions options_;
   layout::Light light_;
   Octree tree_;
@@ -186,9 +149,12 @@ void benchScaling(Bench& bench) {
   std::vector<Series> all{{"octree build", &Lit::build, &Lit::checkTree},
                           {"exact lighting", &Lit::lightExactly, &Lit::checkExact},
                           {fmt::format("lighting, error {}", kError), &Lit::lightWithin, &Lit::checkWithin}};
-  Lit smallest(makeCloud(std::max<std::uint64_t>(bench.count() >> kDoublings, 2), 0, options.falloff), options);
+  Lit smallest(
+      benchCloud(std::max<std::uint64_t>(bench.count() >> kDoublings, 2), options.falloff, {.finer = 1 << kMiddle}),
+      options);
   for (int doublings = 1; doublings <= kDoublings; ++doublings) {
-    Lit larger(makeCloud(bench.count() >> (kDoublings - doublings), smallest.radius(), options.falloff), options);
+    Lit larger(benchCloud(bench.count() >> (kDoublings - doublings), options.falloff, {.radius = smallest.radius()}),
+               options);
     for (Series& series : all) timeAgainst(bench, series, smallest, larger);
   }
   for (const Series& series : all)

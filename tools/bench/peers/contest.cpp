@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "host/core/error.h"
@@ -15,15 +14,6 @@ namespace mote {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-template <class Work>
-void time(const Work& work, Side& side) {
-  const std::clock_t start = std::clock();
-  const Timer timer;
-  work();
-  side.seconds.push_back(timer.seconds());
-  side.core.push_back(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
-}
 
 std::string nameOf(const Approximation& chosen) {
   if (!chosen.grid) return "Mote, exact";
@@ -41,29 +31,21 @@ Json toJson(const Match& match, std::size_t count) {
                {"error", match.error},
                {"a", match.mote.name},
                {"b", match.peer.name},
-               {"ratio_median", nullptr},
-               {"ratio_min", nullptr},
-               {"ratio_max", nullptr},
-               {"seconds_a", match.mote.seconds},
-               {"seconds_b", match.peer.seconds},
-               {"core_seconds_a", match.mote.core},
-               {"core_seconds_b", match.peer.core},
+               {"seconds_a", match.mote.times.wall},
+               {"seconds_b", match.peer.times.wall},
+               {"core_seconds_a", match.mote.times.core},
+               {"core_seconds_b", match.peer.times.core},
                {"prepare_seconds_b", match.prepareSeconds},
                {"accuracy_a", toJson(match.mote.accuracy)},
                {"accuracy_b", toJson(match.peer.accuracy)},
                {"check", {{"text", fmt::format("mean |ΔT| ≤ {}", match.limit)}, {"passed", match.passed()}}}};
-  if (const std::vector<double> ratios = match.ratios(); !ratios.empty()) {
-    const auto [least, most] = std::minmax_element(ratios.begin(), ratios.end());
-    json["ratio_median"] = median(ratios);
-    json["ratio_min"] = *least;
-    json["ratio_max"] = *most;
-  }
+  setRatios(json, match.ratios());
   return json;
 }
 
 /// "Fourier opacity map 128², 7 harmonics     0.118 s   |ΔT| 0.00831 0.0412 0.1931"
 void print(const Side& side) {
-  const std::string seconds = side.seconds.empty() ? "not timed" : fmt::format("{:.4g} s", median(side.seconds));
+  const std::string seconds = side.times.wall.empty() ? "not timed" : fmt::format("{:.4g} s", median(side.times.wall));
   fmt::print("    {:<45} {:>10}   |ΔT| {:.5f} {:.4f} {:.4f}", side.name, seconds, side.accuracy.mean, side.accuracy.p99,
              side.accuracy.max);
 }
@@ -76,7 +58,7 @@ void print(const Match& match) {
     const std::vector<double> ratios = match.ratios();
     const auto [least, most] = std::minmax_element(ratios.begin(), ratios.end());
     fmt::print("   peer / Mote {:.3g} ({:.3g} .. {:.3g}), of CPU time {:.3g}", median(ratios), *least, *most,
-               median(match.peer.core) / median(match.mote.core));
+               median(match.peer.times.core) / median(match.mote.times.core));
   } else {
     fmt::print("   DIFFERS: beyond a mean |ΔT| of {}", match.limit);
   }
@@ -85,13 +67,6 @@ void print(const Match& match) {
 }
 
 }  // namespace
-
-double median(std::vector<double> values) {
-  MOTE_CHECK(values.size(), >, 0u);
-  std::sort(values.begin(), values.end());
-  const std::size_t middle = values.size() / 2;
-  return values.size() % 2 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
-}
 
 Accuracy accuracyOf(const std::vector<float>& opticalDepths, const std::vector<float>& exact,
                     const layout::Light& light) {
@@ -108,12 +83,6 @@ Accuracy accuracyOf(const std::vector<float>& opticalDepths, const std::vector<f
   const auto p99 = error.begin() + static_cast<std::ptrdiff_t>((error.size() - 1) * 99 / 100);
   std::nth_element(error.begin(), p99, error.end());
   return {sum / static_cast<double>(error.size()), *p99, *std::max_element(p99, error.end())};
-}
-
-std::vector<double> Match::ratios() const {
-  std::vector<double> ratios;
-  for (std::size_t run = 0; run < peer.seconds.size(); ++run) ratios.push_back(peer.seconds[run] / mote.seconds[run]);
-  return ratios;
 }
 
 Contest::Contest(const Octree& tree, const layout::Light& light, const LightingOptions& options, int runs)
@@ -151,8 +120,8 @@ const Match& Contest::hold(const Peer& peer, double error) {
   match.peer.accuracy = accuracyOf(peer.opticalDepths(), exact_, light_);
   std::vector<float> depths;
   for (int run = 0; run < runs_ && match.passed(); ++run) {
-    time([&] { depths = ours(error, chosen); }, match.mote);
-    time([&] { depths = peer.opticalDepths(); }, match.peer);
+    match.mote.times.time([&] { depths = ours(error, chosen); });
+    match.peer.times.time([&] { depths = peer.opticalDepths(); });
   }
   print(match);
   matches_.push_back(std::move(match));

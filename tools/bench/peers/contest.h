@@ -6,6 +6,7 @@
 
 #include "host/lighting/approximate.h"
 #include "tools/bench/peers/peer.h"
+#include "tools/bench/timing.h"
 
 namespace mote {
 
@@ -22,8 +23,7 @@ Accuracy accuracyOf(const std::vector<float>& opticalDepths, const std::vector<f
 struct Side {
   std::string name;
   Accuracy accuracy;
-  std::vector<double> seconds;  ///< wall clock, run by run
-  std::vector<double> core;     ///< CPU time over all threads
+  RunTimes times;
 };
 
 struct Match {
@@ -34,10 +34,8 @@ struct Match {
 
   bool passed() const { return mote.accuracy.mean <= limit && peer.accuracy.mean <= limit; }
   /// Seconds of the peer / seconds of Mote, run by run.
-  std::vector<double> ratios() const;
+  std::vector<double> ratios() const { return pairwiseRatios(peer.times, mote.times); }
 };
-
-double median(std::vector<double> values);
 
 class Contest {
  public:

@@ -8,9 +8,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/core/bins.h"
 #include "host/core/error.h"
 #include "host/core/parallel.h"
-#include "tools/bench/peers/bins.h"
 
 namespace mote {
 namespace {
@@ -93,15 +93,19 @@ void DensityGrid::build() {
       balls[i] = ball;
     }
   });
-  const Bins bins = sortIntoBins(
+  const auto eachLeaf = [&](const Ball& ball, const auto& visit) {
+    const glm::ivec3 lo = glm::max(glm::ivec3(glm::ceil(ball.centre - ball.radius)), 0) / kLeaf;
+    const glm::ivec3 hi = glm::min(glm::ivec3(glm::floor(ball.centre + ball.radius)) / kLeaf, leaves - 1);
+    for (int x = lo.x; x <= hi.x; ++x)
+      for (int y = lo.y; y <= hi.y; ++y)
+        for (int z = lo.z; z <= hi.z; ++z)
+          visit((std::size_t(x) * std::size_t(leaves.y) + std::size_t(y)) * std::size_t(leaves.z) + std::size_t(z));
+  };
+  const Binned<std::uint32_t> bins = sortIntoBins<std::uint32_t>(
       count, std::size_t(leaves.x) * std::size_t(leaves.y) * std::size_t(leaves.z),
-      [&](std::size_t i, const auto& visit) {
-        const glm::ivec3 lo = glm::max(glm::ivec3(glm::ceil(balls[i].centre - balls[i].radius)), 0) / kLeaf;
-        const glm::ivec3 hi = glm::min(glm::ivec3(glm::floor(balls[i].centre + balls[i].radius)) / kLeaf, leaves - 1);
-        for (int x = lo.x; x <= hi.x; ++x)
-          for (int y = lo.y; y <= hi.y; ++y)
-            for (int z = lo.z; z <= hi.z; ++z)
-              visit((std::size_t(x) * std::size_t(leaves.y) + std::size_t(y)) * std::size_t(leaves.z) + std::size_t(z));
+      [&](std::size_t begin, std::size_t end, const auto& put) {
+        for (std::size_t i = begin; i < end; ++i)
+          eachLeaf(balls[i], [&](std::size_t leaf) { put(leaf, static_cast<std::uint32_t>(i)); });
       });
 
   // The leaves are made one after the other, which the tree demands, and filled all at once.
@@ -109,8 +113,8 @@ void DensityGrid::build() {
   grid_->origin = origin, grid_->voxel = voxel;
   openvdb::FloatTree& tree = grid_->density->tree();
   std::vector<std::pair<Leaf*, std::size_t>> work;
-  for (std::size_t bin = 0; bin + 1 < bins.first.size(); ++bin) {
-    if (bins.first[bin] == bins.first[bin + 1]) continue;
+  for (std::size_t bin = 0; bin < bins.bins(); ++bin) {
+    if (bins.of(bin).empty()) continue;
     const std::size_t z = bin % std::size_t(leaves.z), y = bin / std::size_t(leaves.z) % std::size_t(leaves.y),
                       x = bin / std::size_t(leaves.z) / std::size_t(leaves.y);
     work.emplace_back(tree.touchLeaf(openvdb::Coord(int(x) * kLeaf, int(y) * kLeaf, int(z) * kLeaf)), bin);
@@ -120,8 +124,8 @@ void DensityGrid::build() {
     const openvdb::Coord corner = leaf->origin();
     const glm::ivec3 lo(corner.x(), corner.y(), corner.z());
     float* const voxels = leaf->buffer().data();
-    for (std::uint32_t k = bins.first[bin]; k < bins.first[bin + 1]; ++k) {
-      const Ball& ball = balls[bins.item[k]];
+    for (const std::uint32_t item : bins.of(bin)) {
+      const Ball& ball = balls[item];
       coveredVoxels(ball, lo, lo + (kLeaf - 1), [&](int x, int y, int z, float value) {
         voxels[((x - lo.x) * kLeaf + (y - lo.y)) * kLeaf + (z - lo.z)] += ball.density * value;
       });

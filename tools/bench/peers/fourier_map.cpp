@@ -4,10 +4,10 @@
 #include <memory>
 #include <numbers>
 
+#include "host/core/bins.h"
 #include "host/core/error.h"
 #include "host/core/parallel.h"
-#include "tools/bench/peers/bins.h"
-#include "tools/bench/peers/light_frame.h"
+#include "tools/bench/peers/map_frame.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tools/bench/peers/fourier_map.cpp"
@@ -35,7 +35,7 @@ struct Footprint {
 };
 
 struct FourierMap {
-  LightFrame frame;
+  MapFrame frame;
   float loU = 0, loV = 0, texel = 0;    // of the first texel's corner; side of a texel
   float nearest = 0, inverseRange = 0;  // depth 0 … 1
   int width = 0, height = 0, tilesWide = 0, tilesHigh = 0;
@@ -71,7 +71,7 @@ constexpr int kLanes = static_cast<int>(hn::MaxLanes(Tag()));
 
 /// Places of the slots [begin, end) in the light's frame and their distance from it; least and greatest u, v, distance.
 void projectSlots(FourierMap& map, const Octree& tree, std::size_t begin, std::size_t end, float* least, float* most) {
-  const LightFrame& frame = map.frame;
+  const MapFrame& frame = map.frame;
   const auto infinite = hn::Set(kTag, INFINITY);
   hn::Vec<Tag> lo[3] = {infinite, infinite, infinite};
   hn::Vec<Tag> hi[3] = {hn::Neg(infinite), hn::Neg(infinite), hn::Neg(infinite)};
@@ -115,7 +115,7 @@ HWY_INLINE float kernelValues(const FourierMap& map, std::size_t i, int left, in
       const auto column = hn::Iota(kTag, static_cast<float>(u));
       const auto fu =
           hn::MulAdd(hn::Add(column, hn::Set(kTag, 0.5f)), hn::Set(kTag, map.texel), hn::Set(kTag, map.loU));
-      auto square = zero;  // LightFrame::squaredDistance
+      auto square = zero;  // MapFrame::squaredDistance
       if (map.frame.perspective) {
         const auto a = hn::NegMulAdd(z, fv, y), b = hn::MulSub(z, fu, x), c = hn::Sub(hn::Mul(x, fv), hn::Mul(y, fu));
         square =
@@ -348,7 +348,7 @@ std::vector<float> fourierMapDepths(const Octree& tree, const layout::Light& lig
   std::vector<float> depths(count);
   if (count == 0) return depths;
   FourierMap map;
-  map.frame = lightFrame(tree, light);
+  map.frame = mapFrame(tree, light);
   map.numbers = 2 * (options.harmonics + 1);
   map.thick = options.thick;
   fillSeries(map);
@@ -358,19 +358,22 @@ std::vector<float> fourierMapDepths(const Octree& tree, const layout::Light& lig
   });
 
   const auto tiles = static_cast<std::size_t>(map.tilesWide * map.tilesHigh);
-  const Bins bins = sortIntoBins(count, tiles, [&](std::size_t i, const auto& visit) {
-    const Footprint& print = map.footprint[i];
-    const int left = std::max<int>(print.left, 0) / kTile, right = std::min<int>(print.right, map.width - 1);
-    const int top = std::max<int>(print.top, 0) / kTile, bottom = std::min<int>(print.bottom, map.height - 1);
-    if (right < 0 || bottom < 0) return;
-    for (int v = top; v <= bottom / kTile; ++v)
-      for (int u = left; u <= right / kTile; ++u) visit(static_cast<std::size_t>(v * map.tilesWide + u));
-  });
+  const Binned<std::uint32_t> bins =
+      sortIntoBins<std::uint32_t>(count, tiles, [&](std::size_t begin, std::size_t end, const auto& put) {
+        for (std::size_t i = begin; i < end; ++i) {
+          const Footprint& print = map.footprint[i];
+          const int left = std::max<int>(print.left, 0) / kTile, right = std::min<int>(print.right, map.width - 1);
+          const int top = std::max<int>(print.top, 0) / kTile, bottom = std::min<int>(print.bottom, map.height - 1);
+          if (right < 0 || bottom < 0) continue;
+          for (int v = top; v <= bottom / kTile; ++v)
+            for (int u = left; u <= right / kTile; ++u)
+              put(static_cast<std::size_t>(v * map.tilesWide + u), static_cast<std::uint32_t>(i));
+        }
+      });
   map.texels = std::make_unique_for_overwrite<float[]>(tiles * kTile * kTile * std::size_t(map.numbers));
   parallelBlocks(tiles, 1, [&](std::size_t tile, std::size_t) {
-    const std::uint32_t begin = bins.first[tile];
-    HWY_DYNAMIC_DISPATCH(splatTile)
-    (map, static_cast<int>(tile), bins.item.data() + begin, bins.first[tile + 1] - begin);
+    const std::span<const std::uint32_t> items = bins.of(tile);
+    HWY_DYNAMIC_DISPATCH(splatTile)(map, static_cast<int>(tile), items.data(), items.size());
   });
   parallelBlocks(count, kGrain, [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(lookUp)(map, begin, end, depths.data());

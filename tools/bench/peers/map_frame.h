@@ -11,7 +11,7 @@ namespace mote {
 
 /// Axes at the light: z into the scene. A point light's map lies in the plane z = 1 and sees (x / z, y / z), a
 /// directional light's sees (x, y).
-struct LightFrame {
+struct MapFrame {
   bool perspective = false;
   vec3 origin{0};
   vec3 axis[3];  ///< orthonormal: x, y, z
@@ -29,9 +29,9 @@ struct LightFrame {
 };
 
 /// Throws InputError for a point light within the supports' box: one map cannot see all around it.
-inline LightFrame lightFrame(const Octree& tree, const layout::Light& light) {
+inline MapFrame mapFrame(const Octree& tree, const layout::Light& light) {
   const Bounds bounds = tree.bounds();
-  LightFrame frame;
+  MapFrame frame;
   frame.perspective = light.type != layout::kLightDirectional;
   frame.origin = frame.perspective ? light.position : bounds.centre();
   const vec3 forward = frame.perspective ? bounds.centre() - light.position : light.direction;
