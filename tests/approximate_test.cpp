@@ -134,7 +134,7 @@ TEST(Approximate, KeepsTheErrorOnRealSmoke) {
 }
 
 TEST(Approximate, ThreeColoursAndSpotsAndEveryFalloff) {
-  const Cloud cloud = noiseCloud(60000, 2);
+  const Cloud cloud = noiseCloud(200000, 2);  // for fewer, exact sums are cheaper than the probes
   layout::Light spot = pointLight({0, 4, 0});
   spot.type = layout::kLightSpot;
   for (const layout::uint falloff : {layout::kFalloffSmooth, layout::kFalloffLinear, layout::kFalloffSphere}) {
@@ -168,6 +168,39 @@ TEST(Approximate, ThreeColoursAndSpotsAndEveryFalloff) {
     EXPECT_LE(sum / static_cast<double>(lit), 0.02);
     EXPECT_GT(sum, 0);
   }
+}
+
+TEST(LightGrid, ReceiversThatAreNoSlotsReadTheSameGrid) {
+  const Octree tree = noiseCloud(20000, 2).tree(3);
+  const Receivers slots = slotsOf(tree);
+  // Every third slot with its own particle left out, as receivers of their own, in another order.
+  std::vector<float> x, y, z;
+  std::vector<std::uint32_t> self;
+  for (std::size_t k = tree.particleCount(); k-- > 0;)
+    if (k % 3 == 0)
+      x.push_back(tree.x[k]), y.push_back(tree.y[k]), z.push_back(tree.z[k]),
+          self.push_back(static_cast<std::uint32_t>(k));
+  for (const layout::Light& light :
+       {pointLight({2, 3, 1}), pointLight({0.1f, 0, 0.1f}), directionalLight({1, -1, 0.3f})}) {
+    const GridResolution fine{0.3 * tree.meanRadius / (light.type == layout::kLightPoint ? 1.5 : 1), tree.meanRadius};
+    const std::vector<float> all = gridOpticalDepths(tree, slots, light, {}, fine);
+    const std::vector<float> own = gridOpticalDepths(tree, {x, y, z, self}, light, {}, fine);
+    for (std::size_t k = 0; k < self.size(); ++k) ASSERT_NEAR(own[k], all[self[k]], 2e-5 * (1 + all[self[k]])) << k;
+  }
+}
+
+TEST(LightGrid, ParticlesFarApartInDepthCostNoMemoryBetween) {
+  // Two clusters one behind the other, a hundred thousand radii apart: the bins between are left out.
+  Cloud cloud = noiseCloud(20000, 1.5);
+  const double radius = cloud.radius.front();
+  for (std::size_t i = 0; i < cloud.position.size(); ++i)
+    if (i % 2 == 0) cloud.position[i].z += static_cast<float>(1e5 * radius);
+  const Octree tree = cloud.tree(3);
+  const layout::Light light = directionalLight({0, 0, 1});
+  const std::vector<float> exact = transmittances(opticalDepths(tree, light, {}), light);
+  const std::vector<float> found =
+      transmittances(gridOpticalDepths(tree, slotsOf(tree), light, {}, {0.5 * radius, radius}), light);
+  EXPECT_LT(meanDifference(exact, found), 0.01);
 }
 
 TEST(LightGrid, ConvergesToTheExactSumAsItBecomesFiner) {
@@ -254,6 +287,33 @@ double flicker(const Cloud& cloud, const layout::Light& light, double error, int
     last = std::move(found);
   }
   return greatest;
+}
+
+TEST(Approximate, ProbesFewAndFarBetweenAreExact) {
+  for (const double range : {1.0, 10.0}) {
+    const Octree tree = noiseCloud(40000, 2, range).tree(3);
+    std::vector<float> x, y, z;
+    std::vector<std::uint32_t> self;
+    for (std::size_t i = 0; i < 500; ++i) {
+      const auto slot = static_cast<std::uint32_t>(hashBits(4, i) % tree.particleCount());
+      x.push_back(tree.x[slot]), y.push_back(tree.y[slot]), z.push_back(tree.z[slot]), self.push_back(slot);
+    }
+    const Receivers few{x, y, z, self};
+    for (const layout::Light& light :
+         {pointLight({2, 3, 1}), pointLight({0.1f, 0, 0.1f}), directionalLight({1, -1, 0.3f})})
+      for (const layout::uint falloff : {layout::kFalloffSmooth, layout::kFalloffLinear, layout::kFalloffSphere})
+        for (const layout::uint endpoint : {layout::kEndpointSoft, layout::kEndpointClamp}) {
+          const LightingOptions options{.falloff = falloff, .endpoint = endpoint, .cutoff = 0};
+          const std::vector<float> exact = opticalDepths(tree, few, light, options);
+          const std::vector<float> found = opticalDepthsOfFew(tree, few, light, options);
+          for (std::size_t i = 0; i < exact.size(); ++i) ASSERT_NEAR(found[i], exact[i], 1e-5 * (1 + exact[i]));
+          for (const std::string& target : simdTargets()) {
+            useSimdTarget(target);
+            EXPECT_EQ(opticalDepthsOfFew(tree, few, light, options), found) << target;
+          }
+          useSimdTarget("");
+        }
+  }
 }
 
 TEST(Approximate, DoesNotFlicker) {

@@ -13,26 +13,41 @@ namespace {
 constexpr double kQuantile = 2.326;
 /// Sets the probes apart from everything else that an index decides.
 constexpr std::uint64_t kProbeStream = 0xe4405;
-/// Cells [radii] are taken from a ladder of fourth roots of 2, so that a slow motion of light or cloud does not change
-/// the grid from frame to frame.
-constexpr double kLadder = 4;
-constexpr double kCoarsest = 2, kFinest = 0.2;
+/// Cells [radii] are taken from a ladder of eighth roots of 2, so that a slow motion of light or cloud seldom changes
+/// the grid. Coarser cells than the first save next to nothing.
+constexpr double kLadder = 8;
+constexpr double kCoarsest = 1.7, kFinest = 0.2;
 /// Bins of depth [cells]: what a finer one would save of the error costs more than a smaller cell does.
 constexpr double kBinCells = 2;
 constexpr int kMostTries = 4;
-/// Cells that are finer than this are not taken by the model's word: a pilot measures the error first, on a part of the
-/// tiles. A model that is wrong by two costs a third more there, and next to nothing above.
-constexpr double kPilotBelow = 0.45, kPilotCell = 0.5;
 
-/// Mean |ΔT| of a noise cloud (1 M particles, mean τ 4, r = 1.5 spacings, directional light) for cells of h = 2, 1 and
-/// ½ radii is 0.023, 0.012 and 0.0037: about 0.0125 · h above one radius and h^1.5 below.
-double cellFor(double error) {
-  const double ratio = error / 0.0125;
-  return ratio > 1 ? ratio : std::pow(ratio, 1 / 1.5);
-}
 double onLadder(double cellRadii) {
   return std::exp2(std::floor(std::log2(std::clamp(cellRadii, kFinest, kCoarsest)) * kLadder + 1e-6) / kLadder);
 }
+
+/// How much transmittance differs across the light's way: from a probe's to that of a ray beside it. A cell blurs just
+/// that, so its error follows from it, whatever the cloud: see cellFor.
+struct Roughness {
+  double half = 0, whole = 0;  ///< mean |ΔT| at a distance of half a mean radius and of a whole one
+  double slope() const { return whole > 0 && half > 0 ? std::clamp(std::log2(whole / half), 0.3, 1.0) : 1; }
+};
+constexpr std::size_t kBesides = 384;  ///< pairs: the mean is known to 6 %
+
+/// The cell [radii] that is expected to leave a mean |ΔT| of `error`.
+///
+/// Measured for noise clouds (r of 1.5 and of 4 spacings, mean τ 0.1, 4, 50, 0.3 and 1.5 M particles), balls, plumes
+/// and smoke1: a cell of one radius leaves 0.32 of the roughness at one radius (0.22 where many overlap, 0.45 at radii
+/// 10:1). How it goes on from there follows the slope (0.78 at r of 1.5 spacings, 0.95 at 4, 0.45 at radii 10:1): as
+/// h^(1.4 slope) for coarser cells, h^(2.1 slope) down to half a radius, h^(2.8 slope) below.
+double cellFor(double error, const Roughness& roughness) {
+  const double slope = roughness.slope(), atOne = 0.32 * std::max(roughness.whole, 1e-12);
+  const double atHalf = atOne * std::pow(0.5, 2.1 * slope);
+  if (error > atOne) return std::pow(error / atOne, 1 / (1.4 * slope));
+  if (error > atHalf) return std::pow(error / atOne, 1 / (2.1 * slope));
+  return 0.5 * std::pow(error / atHalf, 1 / (2.8 * slope));
+}
+/// Aimed at a little below what is allowed: the upper limit is some 6 % above the mean, and the model as much off.
+constexpr double kAim = 0.85;
 
 /// The receivers whose error is measured.
 struct Probes {
@@ -67,16 +82,20 @@ std::size_t reachedCount(const Receivers& receivers, std::span<const std::uint8_
                          : receivers.size() - static_cast<std::size_t>(std::count(reached.begin(), reached.end(), 0));
 }
 
-/// Compact groups of receivers (neighbours in Morton order), so that few tiles are filled for them.
-Probes drawPilots(const Receivers& receivers, std::span<const std::uint8_t> reached) {
-  constexpr std::size_t kGroups = 8, kGroup = kErrorProbes / kGroups;
-  Probes pilots;
-  for (std::size_t g = 0; g < kGroups; ++g) {
-    const std::size_t first = hashBits(1, g, kProbeStream) % receivers.size();
-    for (std::size_t k = first; k < std::min(first + kGroup, receivers.size()); ++k)
-      if (reached.empty() || reached[k] != 0) pilots.add(receivers, static_cast<std::uint32_t>(k));
-  }
-  return pilots;
+/// Adds rays beside some of the probes, across the light's way: first all at half a radius, then all at one.
+std::size_t addBesides(Probes& probes, const layout::Light& light, double radius) {
+  const std::size_t count = std::min(kBesides, probes.index.size());
+  for (const double distance : {0.5 * radius, radius})
+    for (std::size_t i = 0; i < count; ++i) {
+      const dvec3 start(probes.x[i], probes.y[i], probes.z[i]);
+      const dvec3 way =
+          light.type == layout::kLightDirectional ? dvec3(light.direction) : start - dvec3(light.position);
+      const dvec3 across = glm::cross(way, Random(kProbeStream, i).direction());
+      const dvec3 beside = start + (glm::length(across) > 0 ? glm::normalize(across) * distance : dvec3(0));
+      probes.x.push_back(static_cast<float>(beside.x)), probes.y.push_back(static_cast<float>(beside.y));
+      probes.z.push_back(static_cast<float>(beside.z)), probes.self.push_back(probes.self[i]);
+    }
+  return count;
 }
 
 /// Transmittances of the probes out of all receivers' optical depths.
@@ -107,31 +126,38 @@ void measure(const std::vector<float>& exact, const std::vector<float>& found, s
   result.greatest = errors.back();
 }
 
-/// Mean distance of receivers from a point light (of some hundred of them: it only scales the ladder); 1 for
-/// directional.
-double typicalDistance(const Probes& probes, const layout::Light& light) {
+/// The edge of a cell that is 1 on the plane one unit from a point light, where the probes are and across their rays:
+/// z²·cos θ in area, in the mean. 1 for directional.
+double typicalScale(const Probes& probes, const layout::Light& light) {
   if (light.type == layout::kLightDirectional) return 1;
   double sum = 0;
-  for (std::size_t i = 0; i < probes.x.size(); ++i)
-    sum += glm::length(dvec3(probes.x[i], probes.y[i], probes.z[i]) - dvec3(light.position));
+  for (std::size_t i = 0; i < probes.x.size(); ++i) {
+    const dvec3 offset = glm::abs(dvec3(probes.x[i], probes.y[i], probes.z[i]) - dvec3(light.position));
+    const double z = std::max({offset.x, offset.y, offset.z}), distance = glm::length(offset);
+    sum += distance > 0 ? z * std::sqrt(z / distance) : 0;
+  }
   return sum / static_cast<double>(probes.x.size());
 }
 
 /// Core seconds · 1e6 a receiver, fitted to clouds of 0.25–4 M particles on one machine. Only the ratio matters: it is
 /// the same within a factor of 1.5 on every instruction set.
 double gridCost(double cellRadii) {
-  const double across = 2 * std::sqrt(std::max(1 - 1.333 * cellRadii * cellRadii, 1.1 * cellRadii * cellRadii));
-  const double nodes = across / cellRadii + 1;
-  return 0.11 + 0.0045 * nodes * nodes;
+  const double across = 2 * std::sqrt(std::max(1 / (cellRadii * cellRadii) - 1.333, 0.25));  // cells of a kernel
+  return 0.055 + 0.0045 * (across + 1) * (across + 1);
 }
-double exactCost(const Octree& tree) {
-  // What a ray meets: its share of the discs on the cloud's cross-section, half of them before it; clouds clump by
-  // about two. A third of what its packet is held against.
+/// What an endless ray meets: its share of the discs on the cloud's cross-section; clouds clump by about two.
+double particlesMet(const Octree& tree) {
   const dvec3 size(tree.bounds().size());
   const double section = std::max((size.x * size.y + size.y * size.z + size.z * size.x) / 3, 1e-300);
-  const double met = static_cast<double>(tree.particleCount()) * kPi * tree.meanRadius * tree.meanRadius / section;
-  return 0.2 + 0.0009 * met;
+  double squares = 0;
+  const std::size_t count = tree.particleCount(), step = count / 4096 + 1;
+  for (std::size_t slot = 0; slot < count; slot += step)
+    squares += static_cast<double>(step) * tree.radius[slot] * tree.radius[slot];
+  return kPi * squares / section;
 }
+double exactCost(double met) { return 0.35 + 0.0009 * met; }
+/// Of one probe.
+double probeCost(double met) { return 4 + 0.035 * met; }
 
 /// The search for a grid that keeps an error.
 class GridSearch {
@@ -144,55 +170,61 @@ class GridSearch {
         options_(options),
         reached_(reached),
         probes_(drawProbes(receivers, reached)),
-        exactCost_(exactCost(tree)) {
+        exactCost_(exactCost(particlesMet(tree))) {
+    const double probed = static_cast<double>(probes_.index.size() + 2 * kBesides) * probeCost(particlesMet(tree));
+    probeCost_ = probed / static_cast<double>(reachedCount(receivers, reached));
     // Rounded, so that a slow motion does not change the grid.
     const auto rounded = [](double x, double steps) { return std::exp2(std::round(std::log2(x) * steps) / steps); };
-    distance_ = rounded(typicalDistance(probes_, light), kLadder);
-    radius_ = rounded(tree.meanRadius, 4 * kLadder);
+    scale_ = rounded(typicalScale(probes_, light), 16);
+    radius_ = rounded(tree.meanRadius, 16);
   }
 
   /// Depths within the error; empty if exact sums are cheaper.
   std::vector<float> run(double error, Approximation& chosen, const RaysDone& done) {
-    double cell = firstCell(error);
-    std::vector<float> exact;
+    if (!worthwhile(kCoarsest, probeCost_)) return {};
+    const std::vector<float> exact = exactAtProbes();
+    double cell = onLadder(cellFor(kAim * error, roughness_));
     for (chosen.tries = 0; chosen.tries < kMostTries && worthwhile(cell);) {
-      if (exact.empty()) exact = exactAt(probes_);
       chosen.grid = true;
       chosen.cellRadii = cell;
-      chosen.resolution = resolution(cell);
+      chosen.resolution = {cell * radius_ / scale_, kBinCells * cell * radius_};
       std::vector<float> depths = gridOpticalDepths(tree_, receivers_, light_, options_, chosen.resolution, reached_,
                                                     chosen.tries == 0 ? done : RaysDone{});
       ++chosen.tries;
-      measure(exact, atProbes(depths, receivers_.size(), probes_, light_, options_), probes_.x.size(), chosen);
+      measure(exact, atProbes(depths, receivers_.size(), probes_, light_, options_), probes_.index.size(), chosen);
       if (chosen.upper <= error) return depths;
       // As the model's slope has it, and at least a step.
-      cell = std::min(onLadder(cell * std::pow(error / chosen.upper, 1 / 1.5)), cell * std::exp2(-1 / kLadder));
+      cell = std::min(onLadder(cell * std::pow(kAim * error / chosen.mean, 1 / (2.1 * roughness_.slope()))),
+                      cell * std::exp2(-1 / kLadder));
     }
     return {};
   }
 
  private:
-  bool worthwhile(double cell) const { return cell >= kFinest && gridCost(cell) < exactCost_; }
-  GridResolution resolution(double cell) const { return {cell * radius_ / distance_, kBinCells * cell * radius_}; }
-  std::vector<float> exactAt(const Probes& probes) const {
-    return transmittances(opticalDepths(tree_, probes.receivers(), light_, options_), probes.x.size(), light_,
-                          options_.extinction);
+  /// `before`: what else must be spent. Once that is done only the grid counts.
+  bool worthwhile(double cell, double before = 0) const {
+    return cell >= kFinest && gridCost(cell) + before < exactCost_;
   }
 
-  double firstCell(double error) const {
-    const double expected = cellFor(error);
-    if (expected >= kPilotBelow || !worthwhile(kPilotCell)) return onLadder(expected);
-    const Probes pilots = drawPilots(receivers_, reached_);
-    if (pilots.index.empty()) return onLadder(expected);
-    std::vector<std::uint8_t> only(receivers_.size(), 0);
-    for (const std::uint32_t k : pilots.index) only[k] = 1;
-    Approximation pilot;
-    measure(exactAt(pilots),
-            atProbes(gridOpticalDepths(tree_, receivers_, light_, options_, resolution(kPilotCell), only),
-                     receivers_.size(), pilots, light_, options_),
-            pilots.index.size(), pilot);
-    // A tenth less, since the pilots are not spread as the probes are.
-    return onLadder(kPilotCell * std::pow(0.9 * error / std::max(pilot.mean, 1e-9), 1 / 1.5));
+  /// Transmittances of the probes, [channel][probe]; and the roughness.
+  std::vector<float> exactAtProbes() {
+    Probes all = probes_;
+    const std::size_t pairs = addBesides(all, light_, radius_), count = probes_.index.size(), rays = all.x.size();
+    const std::vector<float> found =
+        transmittances(opticalDepthsOfFew(tree_, all.receivers(), light_, options_), rays, light_, options_.extinction);
+    const std::size_t channels = found.size() / rays;
+    std::vector<float> exact(channels * count);
+    for (std::size_t c = 0; c < channels; ++c) {
+      const float* own = found.data() + c * rays;
+      std::copy_n(own, count, exact.data() + c * count);
+      const auto meanDifference = [&](const float* beside) {
+        double sum = 0;
+        for (std::size_t i = 0; i < pairs; ++i) sum += std::abs(double(own[i]) - double(beside[i]));
+        return sum / static_cast<double>(pairs * channels);
+      };
+      roughness_.half += meanDifference(own + count), roughness_.whole += meanDifference(own + count + pairs);
+    }
+    return exact;
   }
 
   const Octree& tree_;
@@ -201,7 +233,8 @@ class GridSearch {
   const LightingOptions& options_;
   std::span<const std::uint8_t> reached_;
   Probes probes_;
-  double exactCost_, distance_, radius_;
+  double exactCost_, probeCost_, scale_, radius_;
+  Roughness roughness_;
 };
 
 }  // namespace

@@ -51,7 +51,8 @@ void Beam::resize(std::size_t count) {
   rays.receiver.resize(count);
 }
 
-void Beam::setRays(const Column& column, const Receivers& receivers, std::span<const std::uint32_t> members) {
+void Beam::setRays(const Column& column, const Receivers& receivers, std::span<const std::uint32_t> members,
+                   bool inColumnFrame) {
   const LightFrame& wide = column.frame;
   const auto offset = [&](std::uint32_t member) { return dvec3(receivers.position(member)) - wide.origin; };
   Box box;
@@ -71,7 +72,7 @@ void Beam::setRays(const Column& column, const Receivers& receivers, std::span<c
   if (wide.perspective)
     frame = frameAbout(wide.origin, glm::normalize(wide.axis + middle.x * wide.u + middle.y * wide.v), true);
   const dvec2 half = 0.5 * (box.hi - box.lo);
-  careful = column.precise || (wide.perspective && glm::dot(half, half) > kNarrow);
+  careful = inColumnFrame || column.precise || (wide.perspective && glm::dot(half, half) > kNarrow);
   if (careful) frame = wide;
   const dvec2 shift = careful || wide.perspective ? dvec2(0) : middle;
   const dvec3* from[3] = {&wide.u, &wide.v, &wide.axis};

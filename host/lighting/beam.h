@@ -40,8 +40,9 @@ struct Beam {
   /// From the column's frame into the beam's: (u, v, 1) → rows · (u, v, 1), divided by the third.
   float turn[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
-  /// Rays from `members`, some of those that the column was set for.
-  void setRays(const Column& column, const Receivers& receivers, std::span<const std::uint32_t> members);
+  /// Rays from `members`, some of those that the column was set for; `inColumnFrame`: careful, however narrow.
+  void setRays(const Column& column, const Receivers& receivers, std::span<const std::uint32_t> members,
+               bool inColumnFrame = false);
   /// The column's one line.
   void setLine();
 

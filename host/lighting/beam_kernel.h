@@ -24,6 +24,12 @@ struct PacketSums {
   alignas(64) float of[3][kPacketRays];
 };
 
+/// Optical depth along one ray of a careful beam, in each of the tree's channels: of all that is placed in the column
+/// and not near the light, in any order, a vector of particles at a time. For rays so far from each other that beams do
+/// not pay. The same bits on every instruction set.
+void sumAlone(const Column& column, const Beam& beam, std::size_t ray, std::size_t channels, const SumOptions& options,
+              float (&sums)[3]);
+
 /// One way of doing all four.
 struct BeamKernel {
   /// Particles of the tree whose support may touch the column, into column.gathered, in slot order.

@@ -8,6 +8,7 @@
 #define HWY_TARGET_INCLUDE "host/lighting/beam_simd.cpp"
 // clang-format off
 #include <hwy/foreach_target.h>
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 // clang-format on
 
@@ -82,10 +83,30 @@ HWY_INLINE void gatherLeaf(const Octree& tree, std::uint32_t begin, std::uint32_
   found.count = count;
 }
 
+/// Asks for what gatherLeaf will load.
+template <int kChannels>
+HWY_INLINE void fetchLeaf(const Octree& tree, std::uint32_t begin, std::uint32_t end) {
+  constexpr std::uint32_t kLine = 64 / sizeof(float);
+  const float* arrays[] = {tree.radius.data(), tree.x.data(),         tree.y.data(),       tree.z.data(),
+                           tree.peak.data(),   tree.peakGreen.data(), tree.peakBlue.data()};
+  for (int k = 0; k < kChannels + 4; ++k)
+    for (std::uint32_t slot = begin; slot < end; slot += kLine) hwy::Prefetch(arrays[k] + slot);
+}
+
 template <int kChannels>
 HWY_NOINLINE void gatherTree(const Octree& tree, Column& column) {
+  // A few leaves behind the walk, so that they have come from memory when they are looked at.
+  constexpr std::uint32_t kAhead = 4;
+  struct Leaf {
+    std::uint32_t begin, end;
+  } leaves[kAhead];
+  std::uint32_t met = 0;
   GatheredParticles& found = column.gathered;
   found.count = 0;
+  const auto gather = [&](const Leaf& leaf) {
+    found.reserve(leaf.end - leaf.begin, kChannels);
+    gatherLeaf<kChannels>(tree, leaf.begin, leaf.end, column.planes, found);
+  };
   const layout::Node* nodes = tree.nodes.data();
   const auto count = static_cast<std::uint32_t>(tree.nodeCount());
   for (std::uint32_t index = 0; index < count;) {
@@ -95,10 +116,12 @@ HWY_NOINLINE void gatherTree(const Octree& tree, Column& column) {
       continue;
     }
     if (node.skip != ++index) continue;  // not a leaf
-    const std::uint32_t end = nodes[index].first;
-    found.reserve(end - node.first, kChannels);
-    gatherLeaf<kChannels>(tree, node.first, end, column.planes, found);
+    Leaf& leaf = leaves[met++ % kAhead];
+    if (met > kAhead) gather(leaf);
+    leaf = {node.first, nodes[index].first};
+    fetchLeaf<kChannels>(tree, leaf.begin, leaf.end);
   }
+  for (std::uint32_t k = met > kAhead ? met - kAhead : 0; k < met; ++k) gather(leaves[k % kAhead]);
 }
 
 void gather(const Octree& tree, Column& column) {
@@ -393,6 +416,73 @@ void sum(const Column& column, const Beam& beam, std::size_t packet, std::size_t
   });
 }
 
+// ---- one ray
+
+/// softShare and the hard end, with everything a vector.
+template <layout::uint kFalloff, layout::uint kEndpoint>
+HWY_INLINE Vec shareAtStart(Vec q, Vec t, Vec radius) {
+  const Vec zero = hn::Zero(kTag);
+  if constexpr (kEndpoint == layout::kEndpointClamp) {
+    const Vec back = hn::Div(hn::Min(t, zero), radius);
+    return falloffOf<kFalloff>(hn::Add(q, hn::Mul(back, back)));
+  } else {
+    const Vec s = hn::Sqrt(hn::Max(hn::Sub(hn::Set(kTag, 1.0f), q), zero));
+    return hn::Mul(falloffOf<kFalloff>(q), capOf(t, hn::Mul(radius, s)));
+  }
+}
+
+template <int kChannels, layout::uint kFalloff, layout::uint kEndpoint>
+HWY_NOINLINE void sumRay(const Column& column, const Beam& beam, std::size_t ray, float (&sums)[3]) {
+  const hn::RebindToUnsigned<Tag> slotTag;
+  const PlacedParticles& p = column.placed;
+  const GatheredParticles& found = column.gathered;
+  const BeamRays& rays = beam.rays;
+  const auto set = [](float x) { return hn::Set(kTag, x); };
+  const Vec u = set(rays.u[ray]), uLow = set(rays.uLow[ray]), v = set(rays.v[ray]), vLow = set(rays.vLow[ray]),
+            slopeU = set(rays.slopeU[ray]), slopeV = set(rays.slopeV[ray]), norm = set(rays.inverseNorm[ray]),
+            depth = set(rays.depth[ray]), depthLow = set(rays.depthLow[ray]), one = set(1), quarter = set(0.25f);
+  const auto self = hn::Set(slotTag, rays.self[ray]);
+  alignas(64) float lanes[kChannels][kPacketRays] = {};
+  for (std::size_t first = 0; first < found.count; first += kPacketRays)
+    for (std::size_t lane = 0; lane < kPacketRays; lane += kLanes) {
+      const std::size_t i = first + lane;
+      const auto load = [i](const std::vector<float>& from) { return hn::LoadU(kTag, from.data() + i); };
+      const Vec du = hn::Add(hn::Sub(load(p.u), u), hn::Sub(load(p.uLow), uLow)),
+                dv = hn::Add(hn::Sub(load(p.v), v), hn::Sub(load(p.vLow), vLow));
+      const Vec cross = hn::Sub(hn::Mul(du, slopeV), hn::Mul(dv, slopeU));
+      const Vec q = hn::Mul(dot3(du, dv, cross, du, dv, cross), hn::Mul(load(p.inverseArea), norm));
+      auto met = hn::Lt(q, one);
+      if (i + kLanes > found.count) met = hn::And(met, hn::FirstN(kTag, i < found.count ? found.count - i : 0));
+      if (hn::AllFalse(kTag, met)) continue;
+      const Vec radius = load(found.radius), b2 = hn::Mul(q, hn::Mul(radius, radius));
+      Vec t = hn::Add(hn::Sub(depth, load(p.depth)), hn::Sub(depthLow, load(p.depthLow)));
+      if (column.frame.perspective) {
+        const Vec inner = hn::Mul(quarter, hn::Mul(b2, load(p.sagRatio)));
+        t = hn::Add(t, hn::Mul(hn::Mul(b2, load(p.sagFirst)), hn::Add(one, inner)));
+      }
+      met = hn::And(met, hn::RebindMask(kTag, hn::Ne(hn::LoadU(slotTag, found.slot.data() + i), self)));
+      const Vec share = hn::IfThenElseZero(met, shareAtStart<kFalloff, kEndpoint>(q, t, radius));
+      for (int c = 0; c < kChannels; ++c) {
+        const Vec added = hn::IfThenElseZero(met, hn::Mul(load(found.peak[c]), share));
+        hn::Store(hn::Add(hn::Load(kTag, lanes[c] + lane), added), kTag, lanes[c] + lane);
+      }
+    }
+  for (int c = 0; c < kChannels; ++c) {
+    sums[c] = 0;
+    for (const float part : lanes[c]) sums[c] += part;
+  }
+}
+
+void sumOne(const Column& column, const Beam& beam, std::size_t ray, std::size_t channels, const SumOptions& options,
+            float (&sums)[3]) {
+  withRule(options.falloff, options.endpoint, [&]<layout::uint kFalloff, layout::uint kEndpoint>() {
+    if (channels == 1)
+      sumRay<1, kFalloff, kEndpoint>(column, beam, ray, sums);
+    else
+      sumRay<3, kFalloff, kEndpoint>(column, beam, ray, sums);
+  });
+}
+
 }  // namespace mote::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -403,12 +493,22 @@ HWY_EXPORT(gather);
 HWY_EXPORT(place);
 HWY_EXPORT(choose);
 HWY_EXPORT(sum);
+HWY_EXPORT(sumOne);
+
+void sumAlone(const Column& column, const Beam& beam, std::size_t ray, std::size_t channels, const SumOptions& options,
+              float (&sums)[3]) {
+  HWY_DYNAMIC_DISPATCH(sumOne)(column, beam, ray, channels, options, sums);
+}
 
 const BeamKernel& simdBeamKernel() {
-  static const BeamKernel kernel{[](const Octree& tree, Column& column) { HWY_DYNAMIC_DISPATCH(gather)
-                                                                          (tree, column); },
-                                 [](Column& column) { HWY_DYNAMIC_DISPATCH(place)
-                                                      (column); },
+  static const BeamKernel kernel{[](const Octree& tree, Column& column) {
+                                   HWY_DYNAMIC_DISPATCH(gather)
+                                   (tree, column);
+                                 },
+                                 [](Column& column) {
+                                   HWY_DYNAMIC_DISPATCH(place)
+                                   (column);
+                                 },
                                  [](const Column& column, std::size_t channels, Beam& beam) {
                                    HWY_DYNAMIC_DISPATCH(choose)(column, channels, beam);
                                  },

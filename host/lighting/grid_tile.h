@@ -1,31 +1,25 @@
 // One tile of a light grid, and the steps that fill and read it (light_grid.h).
+//
+// Nodes stand [row][column][bin]: a kernel adds to a few short runs of bins, and a ray's depths lie side by side.
 #pragma once
 #include <cstdint>
+#include <span>
 #include <vector>
 
-#include "host/lighting/column.h"
-#include "host/lighting/light_grid.h"
+#include "host/lighting/grid_plan.h"
 
 namespace mote {
 
-/// Cells along a tile's edge: wide enough that few particles lie in two tiles, few enough that a hundred layers of
-/// nodes stay in the second cache.
-constexpr int kTileCells = 32;
-/// Particles nearer to a point light than this many radii are not ellipses on a cube's face: at its corners a second
-/// order of (r/ρ) would be off by a tenth of their mass at ten radii.
-constexpr double kCurvedRadii = 32;
-/// Lanes of a row of nodes, whatever the machine has.
-constexpr int kGridLanes = 8;
-/// Nodes of a row: those of the cells, and room for a whole vector from the last.
-constexpr int kTileStride = kTileCells + kGridLanes;
-constexpr int kTileRows = kTileCells + 1;
-
-/// What follows from the falloff F(q): its integral over the unit disc is π · mass, and its variance along one axis
-/// `variance` of r².
-struct KernelMoments {
-  double mass, variance;
-};
-KernelMoments kernelMoments(layout::uint falloff);
+/// Bins go in groups of so many, the lanes of a vector on every machine. Groups that nothing needs are left out.
+constexpr int kGroupBins = 4;
+/// Kernels on up to so many nodes across and up to so many groups of bins go a vector of particles at a time; others
+/// one by one.
+constexpr int kMostWindow = 8, kMostGroups = 2;
+/// Nodes beyond the tile's on each side, so that such kernels need no clipping: a centre stands up to half a window
+/// outside, and its nodes as many from there.
+constexpr int kNodeMargin = kMostWindow;
+/// Particles of a step; arrays have room for one more.
+constexpr std::size_t kGridBatch = 16;
 
 /// Share of a particle that lies before its centre plus x radii of depth, −1 ≤ x ≤ 1: the end caps of DESIGN §2
 /// averaged over the smooth kernel, ½ ± (0.9|x| − 0.5|x|³ + 0.1 x⁶).
@@ -35,46 +29,83 @@ inline float depthShare(float x) {
   return x < 0 ? 0.5f - half : 0.5f + half;
 }
 
+/// Points in a tile.
+struct GridPoints {
+  std::vector<float> sourceX, sourceY, sourceZ;  ///< as they were found [scene units]
+  std::vector<float> x, y;                       ///< nodes from the tile's corner
+  std::vector<float> depth;                      ///< bins from the tile's base
+  std::vector<std::int32_t> bin;                 ///< that the depth lies in
+  std::size_t count = 0;
+  void resize(std::size_t size);
+};
+
+/// Particles in a tile.
+struct GridParticles {
+  GridPoints points;
+  std::vector<float> radius, peak[3];
+  /// Half width in cells of what a kernel covers; 0: nothing is put down.
+  std::vector<float> half;
+  /// q = a·Δx² + b·Δx·Δy + c·Δy² in nodes; `mass` is the integral of F in cells.
+  std::vector<float> a, b, c, mass;
+  /// In bins: of the kernel's middle, the centre less the mean sag over the kernel (column.h), and the radius.
+  std::vector<float> depth, depthRadius;
+  std::vector<std::int32_t> firstBin, lastBin;
+  /// Point lights, nearer than kCurvedRadii: z²/r², narrowed; the footprint's two sides differ, so q is taken by its
+  /// full formula, and `mass` is a solid angle over the cell's area. Else 0.
+  std::vector<float> curved;
+  /// Share of its peak that a particle finds of itself where it stands.
+  std::vector<float> own;
+  void resize(std::size_t size, std::size_t channels);
+};
+
 /// Set up again for each tile; holds on to its memory.
 struct GridTile {
+  const GridShape* shape = nullptr;
   LightFrame frame;
-  GridResolution resolution;
   double firstColumn = 0, firstRow = 0;  ///< node numbers of the tile's corner
+  double bin = 0;                        ///< of depth [scene units]
   double depthBase = 0;                  ///< in bins, whole
   layout::uint falloff = layout::kFalloffSmooth;
-  KernelMoments moments{};
+  std::size_t channels = 1;
 
-  Column column;  ///< planes and gathered particles
-  /// Of gathered particles: place in nodes from the tile's corner, depth and radius in bins, and the quadratic form of
-  /// q = a·Δx² + b·Δx·Δy + c·Δy² in nodes; `mass` is the integral of F in cells. `depth` is less
-  /// by the mean sag over the kernel (column.h). `own`: at first the centre's own depth, when the tile is filled the
-  /// share of its peak that the particle finds of itself where it stands.
-  struct Splats {
-    std::vector<float> x, y, depth, depthRadius, a, b, c, mass, own;
-    /// Point lights, nearer than kCurvedRadii: z²/r², narrowed; the footprint's two sides differ, so q is taken by its
-    /// full formula, and `mass` is a solid angle over the cell's area. Else 0.
-    std::vector<float> curved;
-    std::vector<Place> place;
-    void resize(std::size_t count);
-  } splats;
+  GridParticles particles;
+  /// The first of `particles` where receivers are slots; else `otherPoints`.
+  std::size_t receivers = 0;
+  bool receiversAreParticles = false;
+  GridPoints otherPoints;
+  const GridPoints& receiverPoints() const { return receiversAreParticles ? particles.points : otherPoints; }
 
-  std::vector<std::uint32_t> receiver;
-  std::vector<float> receiverX, receiverY, receiverDepth;
+  /// Groups from firstGroup on: the place in a node's run of bins where each begins, or −1 for those left out. Every
+  /// run begins with a group of zeros, what lies before everything.
+  int firstGroup = 0;
+  std::vector<std::int32_t> groupAt;
+  int run = 0;                  ///< bins of a node
+  int stride = 0;               ///< nodes of a row
+  std::vector<float> nodes[3];  ///< at first what lies in each bin, then the optical depth up to its end
 
-  int firstLayer = 0, layers = 0;  ///< edges of bins: layers + 1 of them, from depthBase + firstLayer on
-  std::vector<float> nodes[3];     ///< [edge][row][column]; edge 0 is empty, then optical depth before each edge
-  float* layer(int channel, int edge) {
-    return nodes[channel].data() + static_cast<std::size_t>(edge) * kTileRows * kTileStride;
+  /// Places everything about a point [scene units] where a receiver is, and allots the nodes. Bins are made longer, by
+  /// twos, where a tile is so deep that its nodes would take more than 64 MiB.
+  void place(const TilePlace& where, const dvec3& somewhere);
+
+  std::size_t node(int column, int row) const {
+    return static_cast<std::size_t>((row + kNodeMargin) * stride + column + kNodeMargin) *
+           static_cast<std::size_t>(run);
   }
-  std::vector<float> footprint;  ///< of one particle at a time
+  /// Where the run's bins of a group begin; < 0: left out.
+  int placeOfGroup(int group) const {
+    const int at = group - firstGroup;
+    return at < 0 || at >= static_cast<int>(groupAt.size()) ? -1 : groupAt[static_cast<std::size_t>(at)];
+  }
 };
 
 /// The steps on vectors, the same bits on every instruction set.
-/// column.gathered → splats.
-void placeSplats(GridTile& tile);
-/// Puts the splats down and sums along the depth.
-void fillTile(GridTile& tile, std::size_t channels);
-/// Optical depths of all receivers, [channel][k] with `count` receivers a channel.
-void readTile(const GridTile& tile, std::size_t channels, std::vector<float>& depths);
+/// Places of points, bins included.
+void placePoints(const GridTile& tile, GridPoints& points);
+/// Places of particles and their kernels.
+void placeParticles(GridTile& tile);
+/// Puts the kernels down, on nodes that are all 0, and sums along the depth.
+void fillTile(GridTile& tile);
+/// Optical depths of all receivers, [channel][receiver].
+void readTile(const GridTile& tile, std::vector<float>& depths);
 
 }  // namespace mote

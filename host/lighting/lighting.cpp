@@ -44,6 +44,18 @@ void sumBeam(const Octree& tree, const BeamKernel& kernel, const SumOptions& opt
   }
 }
 
+/// Calls put(receiver, channel, sum) for all rays of one beam.
+template <class Put>
+void sumBeamRays(const Octree& tree, const BeamKernel& kernel, const SumOptions& options, Workspace& work,
+                 const Put& put) {
+  const std::vector<std::uint32_t>& rays = work.beam.rays.receiver;
+  sumBeam(tree, kernel, options, work, [&](std::size_t packet, const PacketSums& sums) {
+    const std::size_t first = packet * kPacketRays, count = std::min<std::size_t>(kPacketRays, rays.size() - first);
+    for (std::size_t channel = 0; channel < tree.channels(); ++channel)
+      for (std::size_t lane = 0; lane < count; ++lane) put(rays[first + lane], channel, sums.of[channel][lane]);
+  });
+}
+
 std::vector<float> sumAll(const Octree& tree, const Receivers& receivers, const layout::Light& light,
                           const LightingOptions& options, std::span<const std::uint8_t> reached, const RaysDone& done,
                           const BeamKernel& kernel) {
@@ -59,12 +71,8 @@ std::vector<float> sumAll(const Octree& tree, const Receivers& receivers, const 
     fillColumn(tree, kernel, work.column);
     for (std::size_t b = beams.column[c]; b < beams.column[c + 1]; ++b) {
       work.beam.setRays(work.column, receivers, beams.ofBeam(b));
-      const std::vector<std::uint32_t>& rays = work.beam.rays.receiver;
-      sumBeam(tree, kernel, rules, work, [&](std::size_t packet, const PacketSums& sums) {
-        const std::size_t first = packet * kPacketRays, count = std::min<std::size_t>(kPacketRays, rays.size() - first);
-        for (std::size_t channel = 0; channel < tree.channels(); ++channel)
-          for (std::size_t lane = 0; lane < count; ++lane)
-            depths[channel * receivers.size() + rays[first + lane]] = sums.of[channel][lane];
+      sumBeamRays(tree, kernel, rules, work, [&](std::uint32_t receiver, std::size_t channel, float sum) {
+        depths[channel * receivers.size() + receiver] = sum;
       });
     }
     if (done) done(beams.ofColumn(c).size());
@@ -103,6 +111,43 @@ std::vector<float> opticalDepths(const Octree& tree, const Receivers& receivers,
 std::vector<float> opticalDepths(const Octree& tree, const layout::Light& light, const LightingOptions& options,
                                  const RaysDone& done) {
   return sumAll(tree, slotsOf(tree), light, options, {}, done, simdBeamKernel());
+}
+
+std::vector<float> opticalDepthsOfFew(const Octree& tree, const Receivers& receivers, const layout::Light& light,
+                                      const LightingOptions& options) {
+  // What is found for a column is looked at by each of its rays: few of them, so that it is not much.
+  constexpr std::size_t kMostRays = 64;
+  std::vector<float> depths(tree.channels() * receivers.size(), 0.0f);
+  if (shadowless(light) || tree.particleCount() == 0) return depths;
+  const SumOptions rules = sumOptions(light, options);
+  const BeamKernel& kernel = simdBeamKernel();
+  const ColumnRules shape = columnRules(tree, light, receivers.bounds());
+  const Beams beams = planBeams(receivers, light, {}, tree.meanRadius, {kMostRays, kMostRays});
+  parallelBlocks(beams.columns(), 1, [&](std::size_t c, std::size_t) {
+    Workspace& work = workspace();
+    Column& column = work.column;
+    const std::span<const std::uint32_t> members = beams.ofColumn(c);
+    const auto put = [&](std::uint32_t receiver, std::size_t channel, float sum) {
+      depths[channel * receivers.size() + receiver] = sum;
+    };
+    column.setRays(receivers, light, members, shape);
+    kernel.gather(tree, column);
+    kernel.place(column);
+    work.beam.setRays(column, receivers, members, true);
+    const auto end = column.placed.place.begin() + static_cast<std::ptrdiff_t>(column.gathered.count);
+    if (std::find(column.placed.place.begin(), end, Place::NearLight) != end) {
+      column.sort(tree.channels());
+      sumBeamRays(tree, kernel, rules, work, put);
+      return;
+    }
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      float sums[3];
+      sumAlone(column, work.beam, k, tree.channels(), rules, sums);
+      for (std::size_t channel = 0; channel < tree.channels(); ++channel)
+        put(work.beam.rays.receiver[k], channel, sums[channel]);
+    }
+  });
+  return depths;
 }
 
 std::vector<float> opticalDepthsScalar(const Octree& tree, const Receivers& receivers, const layout::Light& light,

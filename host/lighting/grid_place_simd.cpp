@@ -1,0 +1,231 @@
+// Where particles and receivers stand in a light grid, compiled once for each instruction set (Google Highway). In
+// double: a cell may be a millionth of the distance to the light.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "host/lighting/grid_tile.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "host/lighting/grid_place_simd.cpp"
+// clang-format off
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+// clang-format on
+
+HWY_BEFORE_NAMESPACE();
+namespace mote::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Tag = hn::CappedTag<double, 8>;
+using Narrow = hn::Rebind<float, Tag>;
+using NarrowInt = hn::Rebind<std::int32_t, Tag>;
+using Vec = hn::Vec<Tag>;
+using Mask = hn::Mask<Tag>;
+constexpr Tag kTag;
+constexpr Narrow kNarrow;
+constexpr NarrowInt kNarrowInt;
+
+HWY_INLINE std::size_t lanes() { return hn::Lanes(kTag); }
+HWY_INLINE Vec set(double value) { return hn::Set(kTag, value); }
+HWY_INLINE Vec widen(const float* from) { return hn::PromoteTo(kTag, hn::LoadU(kNarrow, from)); }
+HWY_INLINE void store(Vec value, float* to) { hn::StoreU(hn::DemoteTo(kNarrow, value), kNarrow, to); }
+HWY_INLINE Vec along(Vec x, Vec y, Vec z, const dvec3& axis) {
+  return hn::Add(hn::Add(hn::Mul(x, set(axis.x)), hn::Mul(y, set(axis.y))), hn::Mul(z, set(axis.z)));
+}
+HWY_INLINE Vec square(Vec x) { return hn::Mul(x, x); }
+
+// ---- locate
+
+/// Bits of a mask, lane by lane.
+HWY_INLINE unsigned bitsOf(Mask mask) {
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(kTag, mask, bits);
+  return bits[0];
+}
+
+struct OnFace {
+  Vec u, v, z, face;
+  Vec distanceSquare;
+  Mask nowhere;
+};
+
+HWY_INLINE OnFace onCube(Vec px, Vec py, Vec pz) {
+  const Vec ax = hn::Abs(px), ay = hn::Abs(py), az = hn::Abs(pz);
+  const Mask isX = hn::And(hn::Ge(ax, ay), hn::Ge(ax, az)), isY = hn::Ge(ay, az);
+  const auto choose = [&](Vec x, Vec y, Vec z) { return hn::IfThenElse(isX, x, hn::IfThenElse(isY, y, z)); };
+  const Vec main = choose(px, py, pz), z = hn::Abs(main), zero = hn::Zero(kTag);
+  const Vec face = hn::Add(choose(zero, set(2), set(4)), hn::IfThenElse(hn::Lt(main, zero), set(1), zero));
+  const Vec inverse = hn::Div(set(1), z);
+  return {hn::Mul(choose(py, pz, px), inverse),
+          hn::Mul(choose(pz, px, py), inverse),
+          z,
+          face,
+          hn::Add(hn::Add(square(px), square(py)), square(pz)),
+          hn::Eq(z, zero)};
+}
+
+void locateAll(const LocatePoints& points, const GridShape& shape, double* keys, std::uint8_t* flags) {
+  const LightFrame& first = shape.faces.front();
+  const bool perspective = shape.perspective();
+  const double cell = shape.resolution.cell, size = shape.tileCells;
+  const Vec perCell = set(1 / cell), perTile = set(1 / size), zero = hn::Zero(kTag), one = set(1);
+  const Vec half = set(1 << 23), most = set((1 << 24) - 1);
+  const Vec tent = set(shape.moments.tentSquare());
+  constexpr double kSlack = 1e-3;  // nodes: rounding may go either way
+  const auto part = [&](std::size_t i, std::size_t count) {
+    float padded[4][8] = {};
+    const float* from[4] = {points.x, points.y, points.z, points.radius};
+    for (int k = 0; k < 4; ++k) {
+      if (from[k]) from[k] += i;
+      if (count >= lanes()) continue;
+      if (from[k]) std::copy_n(from[k], count, padded[k]);
+      from[k] = padded[k];
+    }
+    const Vec px = hn::Sub(widen(from[0]), set(first.origin.x)), py = hn::Sub(widen(from[1]), set(first.origin.y)),
+              pz = hn::Sub(widen(from[2]), set(first.origin.z)), r = from[3] ? widen(from[3]) : zero;
+    const OnFace at = perspective ? onCube(px, py, pz)
+                                  : OnFace{along(px, py, pz, first.u), along(px, py, pz, first.v), one, zero, zero,
+                                           hn::Lt(one, zero)};
+    const Vec x = hn::Mul(at.u, perCell), y = hn::Mul(at.v, perCell);
+    const Vec column = hn::Floor(hn::Mul(x, perTile)), row = hn::Floor(hn::Mul(y, perTile));
+    const auto number = [&](Vec tile) { return hn::Min(hn::Max(hn::Add(tile, half), zero), most); };
+    const Vec key =
+        hn::Add(hn::Mul(hn::Add(hn::Mul(at.face, set(1 << 24)), number(row)), set(1 << 24)), number(column));
+    const Vec final = hn::IfThenElse(at.nowhere, set(kNoTile), key);
+    // How far a kernel's nodes reach, on the face of the centre.
+    const Vec cells = hn::Div(hn::Mul(r, perCell), at.z);
+    const Vec narrowed = hn::Sub(square(cells), tent);
+    Vec wide = hn::Sqrt(hn::Max(narrowed, tent));
+    if (perspective) wide = hn::Mul(wide, hn::Sqrt(hn::Add(one, hn::Max(square(at.u), square(at.v)))));
+    const Vec reach = hn::IfThenElse(hn::Gt(narrowed, tent), wide, one);
+    const Vec inX = hn::Sub(x, hn::Mul(column, set(size))), inY = hn::Sub(y, hn::Mul(row, set(size)));
+    const auto before = [&](Vec in) { return hn::Le(hn::Sub(in, reach), set(kSlack)); };
+    const auto behind = [&](Vec in) { return hn::Ge(hn::Add(in, reach), set(size - kSlack)); };
+    Mask anywhere = hn::Gt(reach, set(size - 1)), near = hn::Lt(one, zero);
+    if (perspective) {
+      // Neighbouring faces: a tile there may have nodes a cell beyond its face.
+      const Vec edge = hn::Add(hn::Max(hn::Abs(at.u), hn::Abs(at.v)), hn::Mul(hn::Add(reach, set(2)), set(cell)));
+      anywhere = hn::Or(anywhere, hn::Ge(edge, one));
+      anywhere = hn::Or(anywhere, hn::Lt(at.distanceSquare, square(hn::Mul(set(kCurvedRadii), r))));
+      near = hn::Lt(at.distanceSquare, square(hn::Mul(set(kNearLightRadii / 2), r)));
+    }
+    const std::pair<Mask, LocateFlags> all[] = {{before(inX), kLeft},     {behind(inX), kRight}, {before(inY), kBelow},
+                                                {behind(inY), kAbove},    {anywhere, kAnywhere}, {near, kNearLight},
+                                                {hn::Le(r, zero), kPoint}};
+    std::uint8_t bits[8] = {};
+    for (const auto& [mask, flag] : all) {
+      const unsigned set = bitsOf(mask);
+      if (set == 0) continue;
+      for (std::size_t lane = 0; lane < lanes(); ++lane)
+        bits[lane] |= static_cast<std::uint8_t>((set >> lane & 1) * flag);
+    }
+    double out[8];
+    hn::StoreU(final, kTag, out);
+    for (std::size_t lane = 0; lane < count; ++lane) {
+      keys[i + lane] = out[lane];
+      flags[i + lane] = bits[lane];
+    }
+  };
+  for (std::size_t i = 0; i < points.count; i += lanes()) part(i, std::min(lanes(), points.count - i));
+}
+
+// ---- place
+
+/// The whole number below, held within what an int has.
+HWY_INLINE void storeBin(Vec depth, std::int32_t* to) {
+  const Vec held = hn::Min(hn::Max(hn::Floor(depth), set(-1e9)), set(1e9));
+  hn::StoreU(hn::DemoteTo(kNarrowInt, held), kNarrowInt, to);
+}
+
+struct InFrame {
+  Vec x, y, z, depth;  // depth [scene units]
+};
+HWY_INLINE InFrame placeInFrame(const GridTile& tile, GridPoints& points, std::size_t i) {
+  const LightFrame& frame = tile.frame;
+  const Vec px = hn::Sub(widen(&points.sourceX[i]), set(frame.origin.x)),
+            py = hn::Sub(widen(&points.sourceY[i]), set(frame.origin.y)),
+            pz = hn::Sub(widen(&points.sourceZ[i]), set(frame.origin.z));
+  InFrame at{along(px, py, pz, frame.u), along(px, py, pz, frame.v), along(px, py, pz, frame.axis), {}};
+  at.depth = at.z;
+  Vec perCell = set(1 / tile.shape->resolution.cell);
+  if (frame.perspective) {
+    at.depth = hn::Sqrt(hn::Add(hn::Add(square(at.x), square(at.y)), square(at.z)));
+    perCell = hn::Div(perCell, at.z);
+  }
+  store(hn::Sub(hn::Mul(at.x, perCell), set(tile.firstColumn)), &points.x[i]);
+  store(hn::Sub(hn::Mul(at.y, perCell), set(tile.firstRow)), &points.y[i]);
+  const Vec depth = hn::Sub(hn::Mul(at.depth, set(1 / tile.bin)), set(tile.depthBase));
+  store(depth, &points.depth[i]);
+  // Of the depth as it is stored, so that what lies behind the bin's beginning is never less than 0.
+  storeBin(widen(&points.depth[i]), &points.bin[i]);
+  return at;
+}
+
+void placeAll(const GridTile& tile, GridPoints& points) {
+  for (std::size_t i = 0; i < points.count; i += lanes()) placeInFrame(tile, points, i);
+}
+
+void placeKernels(GridTile& tile) {
+  GridParticles& to = tile.particles;
+  const bool perspective = tile.frame.perspective;
+  const KernelMoments& moments = tile.shape->moments;
+  const Vec perCell = set(1 / tile.shape->resolution.cell), perBin = set(1 / tile.bin), base = set(tile.depthBase);
+  const Vec zero = hn::Zero(kTag), one = set(1), tent = set(moments.tentSquare()), mass = set(kPi * moments.mass);
+  for (std::size_t i = 0; i < to.points.count; i += lanes()) {
+    const InFrame at = placeInFrame(tile, to.points, i);
+    const Vec r = widen(&to.radius[i]);
+    Vec cells = hn::Mul(r, perCell), sag = zero, stretch = one, formA = one, formB = zero, formC = one, reach = one;
+    Mask shown = hn::Gt(r, zero);
+    if (perspective) {
+      cells = hn::Div(cells, at.z);
+      sag = hn::Div(hn::Mul(set(moments.variance), square(r)), at.depth);  // ⟨b²⟩ / 2ρ
+      // b² = z² · (Δu² + Δv² + (Δu·v − Δv·u)²) / n, n = 1 + u² + v² (column.h): an ellipse of the area π (r/z)² √n.
+      const Vec u = hn::Div(at.x, at.z), v = hn::Div(at.y, at.z), uu = square(u), vv = square(v);
+      const Vec n = hn::Add(one, hn::Add(uu, vv));
+      formA = hn::Div(hn::Add(one, vv), n), formC = hn::Div(hn::Add(one, uu), n);
+      formB = hn::Div(hn::Mul(set(-2), hn::Mul(u, v)), n);
+      stretch = hn::Sqrt(n);
+      reach = hn::Sqrt(hn::Add(one, hn::Max(uu, vv)));
+      shown = hn::And(shown, hn::And(hn::Ge(at.depth, hn::Mul(set(kNearLightRadii / 2), r)),
+                                     hn::Gt(at.z, hn::Mul(set(kLeastCosine / 2), at.depth))));
+    }
+    const Vec narrowed = hn::Max(hn::Sub(square(cells), tent), tent);
+    Vec half = hn::IfThenElse(hn::Gt(narrowed, tent), hn::Mul(hn::Sqrt(narrowed), reach), one);
+    Vec total = hn::Mul(hn::Mul(mass, square(cells)), stretch), curved = zero;
+    if (perspective) {
+      const Mask bent = hn::And(shown, hn::Lt(at.depth, hn::Mul(set(kCurvedRadii), r)));
+      curved = hn::IfThenElseZero(bent, hn::Div(hn::Mul(hn::Div(square(at.z), square(r)), square(cells)), narrowed));
+      // Over the solid angle: ∫ F dΩ = π · mass · s² · (1 + variance · s²) with s = r/ρ, to the second order.
+      const Vec s2 = square(hn::Div(r, at.depth));
+      const Vec angle = hn::Mul(hn::Mul(mass, s2), hn::Add(one, hn::Mul(set(moments.variance), s2)));
+      total = hn::IfThenElse(bent, hn::Mul(angle, square(perCell)), total);
+    }
+    half = hn::IfThenElseZero(shown, half);
+    const Vec depth = hn::Sub(hn::Mul(hn::Sub(at.depth, sag), perBin), base), radius = hn::Mul(r, perBin);
+    store(half, &to.half[i]), store(hn::IfThenElseZero(shown, curved), &to.curved[i]);
+    store(hn::Div(formA, narrowed), &to.a[i]), store(hn::Div(formB, narrowed), &to.b[i]);
+    store(hn::Div(formC, narrowed), &to.c[i]), store(total, &to.mass[i]);
+    store(depth, &to.depth[i]), store(radius, &to.depthRadius[i]);
+    storeBin(hn::Sub(depth, radius), &to.firstBin[i]), storeBin(hn::Add(depth, radius), &to.lastBin[i]);
+  }
+}
+
+}  // namespace mote::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace mote {
+
+HWY_EXPORT(locateAll);
+HWY_EXPORT(placeAll);
+HWY_EXPORT(placeKernels);
+
+void locate(const LocatePoints& points, const GridShape& shape, double* keys, std::uint8_t* flags) {
+  HWY_DYNAMIC_DISPATCH(locateAll)(points, shape, keys, flags);
+}
+void placePoints(const GridTile& tile, GridPoints& points) { HWY_DYNAMIC_DISPATCH(placeAll)(tile, points); }
+void placeParticles(GridTile& tile) { HWY_DYNAMIC_DISPATCH(placeKernels)(tile); }
+
+}  // namespace mote
+#endif

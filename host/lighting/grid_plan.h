@@ -1,0 +1,109 @@
+// Which tiles a light grid has, and what belongs to each (light_grid.h).
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "host/lighting/column.h"
+#include "host/lighting/light_grid.h"
+
+namespace mote {
+
+/// Particles nearer to a point light than this many radii are not ellipses on a cube's face: at its corners a second
+/// order of (r/ρ) would be off by a tenth of their mass at ten radii.
+constexpr double kCurvedRadii = 32;
+/// A tent over a cell has a variance of so much of the cell's square along each axis. The interpolation adds it, so
+/// kernels are put down narrower by as much; what would be narrower than a tent then is put down as one, on the four
+/// nodes about its centre.
+constexpr double kTentVariance = 1.0 / 6;
+
+/// What follows from the falloff F(q): its integral over the unit disc is π · mass, and its variance along one axis
+/// `variance` of r².
+struct KernelMoments {
+  double mass, variance;
+  /// The square of the radius of a kernel that has a tent's variance [cells²].
+  double tentSquare() const { return kTentVariance / variance; }
+};
+KernelMoments kernelMoments(layout::uint falloff);
+
+/// What all tiles of a grid share.
+struct GridShape {
+  /// One plane for a directional light, else the six faces of a cube along the world's axes about the light.
+  std::vector<LightFrame> faces;
+  GridResolution resolution;
+  int tileCells = 0;  ///< along a tile's edge
+  KernelMoments moments{};
+
+  bool perspective() const { return faces.front().perspective; }
+};
+std::vector<LightFrame> gridFaces(const layout::Light& light);
+
+/// A tile by number on its face: it has the cells from column · tileCells, row · tileCells on.
+struct TilePlace {
+  std::size_t face = 0;
+  double column = 0, row = 0;
+};
+
+/// The tiles that have receivers, neighbours near each other.
+struct GridPlan {
+  struct Tile {
+    TilePlace place;
+    /// Its receivers are items[begin … middle). Its particles are items[middle … end), and where receivers are slots
+    /// also the receivers.
+    std::size_t begin, middle, end;
+  };
+  std::vector<Tile> tiles;
+  std::vector<std::uint32_t> items;  ///< numbers of receivers, slots; ascending in either part
+  bool receiversAreSlots = false;
+  /// Slots nearer to a point light than kNearLightRadii / 2 radii, ascending; they are in no grid.
+  std::vector<std::uint32_t> nearLight;
+
+  std::span<const std::uint32_t> receivers(const Tile& tile) const {
+    return std::span(items).subspan(tile.begin, tile.middle - tile.begin);
+  }
+  std::span<const std::uint32_t> particles(const Tile& tile) const {
+    const std::size_t begin = receiversAreSlots ? tile.begin : tile.middle;
+    return std::span(items).subspan(begin, tile.end - begin);
+  }
+};
+
+/// Every receiver that is reached (`reached` empty: all) goes to the tile where it stands, every particle to all tiles
+/// that may have a node of its kernel. The result depends on nothing but the arguments. Takes 9 bytes a receiver and
+/// a particle while it runs, and 4 for each entry of the result.
+GridPlan planGrid(const Octree& tree, const Receivers& receivers, const GridShape& shape,
+                  std::span<const std::uint8_t> reached);
+
+/// Where a sphere's kernel has nodes on a face [cells]. `centre`: relative to the light, in front of the face.
+struct NodeRange {
+  dvec2 lo, hi;
+};
+NodeRange nodeRange(const dvec3& centre, double radius, const LightFrame& face, const GridShape& shape);
+/// The same for one nearer than kCurvedRadii to a point light, whose kernel is narrowed to `radius`.
+NodeRange curvedNodeRange(const dvec3& centre, double radius, const LightFrame& face, double cell);
+
+/// Tiles beyond ±2²³ count as the last, so that a tile's number is exact in double. Ordered by face, row, column.
+double tileKey(const TilePlace& tile);
+TilePlace tileOfKey(double key);
+/// Of a point at the light itself.
+constexpr double kNoTile = -1;
+
+/// What locate says of a particle, beside the tile of its centre.
+enum LocateFlags : std::uint8_t {
+  // Sides where the next tile may have nodes of its kernel, and the corners between them.
+  kLeft = 1,
+  kRight = 2,
+  kBelow = 4,
+  kAbove = 8,
+  kAnywhere = 16,   ///< so may any tile
+  kNearLight = 32,  ///< it is nearer to a point light than kNearLightRadii / 2 radii
+  kPoint = 64       ///< its radius is 0
+};
+struct LocatePoints {
+  const float *x, *y, *z;
+  const float* radius;  ///< null: all 0
+  std::size_t count;    ///< the arrays may end there
+};
+/// Keys of tiles and LocateFlags of points; the same bits on every instruction set.
+void locate(const LocatePoints& points, const GridShape& shape, double* keys, std::uint8_t* flags);
+
+}  // namespace mote

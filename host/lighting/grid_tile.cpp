@@ -1,0 +1,77 @@
+#include "host/lighting/grid_tile.h"
+
+#include <algorithm>
+
+namespace mote {
+namespace {
+
+/// Groups between the first and the last of a tile's, and bytes of its nodes: what is deeper gets longer bins.
+constexpr int kMostGroupRange = 1 << 18;
+constexpr std::size_t kMostTileBytes = std::size_t{64} << 20;
+
+template <class T>
+void growTo(std::vector<T>& array, std::size_t size) {
+  if (array.size() < size + kGridBatch) array.resize(size + size / 2 + kGridBatch);
+}
+
+/// Marks the groups that particles or receivers need; false where there are too many.
+bool markGroups(GridTile& tile) {
+  const GridParticles& p = tile.particles;
+  const GridPoints& receivers = tile.receiverPoints();
+  int nearest = std::numeric_limits<int>::max(), deepest = std::numeric_limits<int>::min();
+  for (std::size_t k = 0; k < tile.receivers; ++k)
+    nearest = std::min(nearest, receivers.bin[k]), deepest = std::max(deepest, receivers.bin[k]);
+  for (std::size_t i = 0; i < p.points.count; ++i)
+    if (p.half[i] > 0) nearest = std::min(nearest, p.firstBin[i]);
+  tile.firstGroup = nearest >> 2;
+  const int last = (deepest >> 2) - tile.firstGroup;
+  if (last >= kMostGroupRange) return false;
+  tile.groupAt.assign(static_cast<std::size_t>(last) + 1, -1);
+  const auto mark = [&](int first, int end) {
+    for (int group = (first >> 2) - tile.firstGroup; group <= std::min((end >> 2) - tile.firstGroup, last); ++group)
+      tile.groupAt[static_cast<std::size_t>(group)] = 0;
+  };
+  for (std::size_t k = 0; k < tile.receivers; ++k) mark(receivers.bin[k], receivers.bin[k]);
+  for (std::size_t i = 0; i < p.points.count; ++i)
+    if (p.half[i] > 0) mark(p.firstBin[i], p.lastBin[i]);
+  int groups = 1;
+  for (std::int32_t& at : tile.groupAt)
+    if (at == 0) at = kGroupBins * groups++;
+  // An odd number, so that neighbouring runs do not share a few lines of the cache.
+  tile.run = kGroupBins * (groups | 1);
+  tile.stride = tile.shape->tileCells + 1 + 2 * kNodeMargin;
+  return static_cast<std::size_t>(tile.stride * tile.stride) * static_cast<std::size_t>(tile.run) * sizeof(float) <=
+         kMostTileBytes;
+}
+
+}  // namespace
+
+void GridPoints::resize(std::size_t size) {
+  count = size;
+  for (auto* array : {&sourceX, &sourceY, &sourceZ, &x, &y, &depth}) growTo(*array, size);
+  growTo(bin, size);
+}
+
+void GridParticles::resize(std::size_t size, std::size_t channels) {
+  points.resize(size);
+  for (auto* array : {&radius, &half, &a, &b, &c, &mass, &depth, &depthRadius, &curved, &own}) growTo(*array, size);
+  for (std::size_t channel = 0; channel < channels; ++channel) growTo(peak[channel], size);
+  growTo(firstBin, size), growTo(lastBin, size);
+}
+
+void GridTile::place(const TilePlace& where, const dvec3& somewhere) {
+  frame = shape->faces[where.face];
+  firstColumn = where.column * shape->tileCells, firstRow = where.row * shape->tileCells;
+  const dvec3 offset = somewhere - frame.origin;
+  const double depth = frame.perspective ? glm::length(offset) : glm::dot(offset, frame.axis);
+  for (bin = shape->resolution.bin;; bin *= 2) {
+    depthBase = std::floor(depth / bin);
+    placeParticles(*this);
+    if (!receiversAreParticles) placePoints(*this, otherPoints);
+    if (markGroups(*this)) break;
+  }
+  for (std::size_t channel = 0; channel < channels; ++channel)
+    nodes[channel].assign(static_cast<std::size_t>(stride) * static_cast<std::size_t>(stride * run) + kGridBatch, 0.0f);
+}
+
+}  // namespace mote
