@@ -1,18 +1,16 @@
 """tools/bench/plot_scaling.py on a report whose times are known."""
 import contextlib
 import csv
-import importlib.util
 import io
 import json
 import os
+import sys
 import tempfile
 import unittest
 import xml.etree.ElementTree
 
-ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-spec = importlib.util.spec_from_file_location("plot_scaling", os.path.join(ROOT, "tools", "bench", "plot_scaling.py"))
-plot_scaling = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(plot_scaling)
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools", "bench"))
+import plot_scaling  # noqa: E402
 
 
 def run(series, count, seconds_a, ratio, passed=True):

@@ -24,6 +24,10 @@ struct Benchmark {
   void (*run)(Bench&);
 };
 constexpr Benchmark kBenchmarks[] = {
+    {"figures", "Figures 22 to 25 and 31 of the thesis, stage by stage, on the CPU and on the device",
+     "particles in the largest cloud, the other clouds and the pictures in proportion", kFiguresCount, benchFigures},
+    {"frame", "A frame from PRT file to EXR picture, on the CPU and on the device",
+     "particles, a third of them for sub-sampling, the picture in proportion", kFrameCount, benchFrame},
     {"lighting", "Build of the octree, and lighting on TBB against the compute shader", "particles", 1'000'000,
      benchLighting},
     {"scaling", "Time per particle of octree and lighting at a fixed radius, from 1/64 of the particles to all of them",
@@ -43,6 +47,8 @@ void runOnce(const Contender& contender) {
 void time(const Contender& contender, RunTimes& times) {
   if (contender.prepare) contender.prepare();
   times.time(contender.work);
+  if (!contender.stages) return;
+  for (const auto& [stage, seconds] : *contender.stages) times.stages[stage].push_back(seconds);
 }
 
 /// "0.0986 s (0.0981 .. 0.1204)": median, least and greatest.
@@ -54,19 +60,27 @@ std::string spread(const std::vector<double>& values, const char* unit) {
 /// "1.234 M/s".
 std::string rate(double count, double seconds) { return fmt::format("{:.4g} M/s", count / seconds * 1e-6); }
 
+/// "load 0.85, octree 1.00 s": medians, in the order of the work.
+std::string stageSeconds(const RunTimes& times) {
+  std::string text;
+  for (const char* stage : {"load", "octree", "lighting", "sort", "splat", "write"})
+    if (const auto found = times.stages.find(stage); found != times.stages.end())
+      text += fmt::format("{}{} {:.4g}", text.empty() ? "" : ", ", stage, median(found->second));
+  return text + " s";
+}
+
 void print(const Comparison& comparison) {
   fmt::print("\n{}, {} {}\n", comparison.name, comparison.countB, comparison.unit);
   fmt::print("  check  {}: {}\n", comparison.check.text, comparison.check.passed ? "ok" : "DIFFERS");
   if (!comparison.check.passed) fmt::print("  not timed, because the results are wrong\n");
-  const auto contender = [&](char letter, const std::string& name, std::uint64_t count,
-                             const std::vector<double>& seconds, const std::vector<double>& core) {
+  const auto contender = [&](char letter, const std::string& name, std::uint64_t count, const RunTimes& times) {
     fmt::print("  {}      {:<39} {:>13}  {:<32}  {:.4g} core-s\n", letter, name,
-               rate(static_cast<double>(count), median(seconds)), spread(seconds, " s"), median(core));
+               rate(static_cast<double>(count), median(times.wall)), spread(times.wall, " s"), median(times.core));
+    if (!times.stages.empty()) fmt::print("         {}\n", stageSeconds(times));
   };
-  if (!comparison.timesA.wall.empty())
-    contender('A', comparison.a, comparison.countA, comparison.timesA.wall, comparison.timesA.core);
+  if (!comparison.timesA.wall.empty()) contender('A', comparison.a, comparison.countA, comparison.timesA);
   if (comparison.timesB.wall.empty()) return;
-  contender('B', comparison.b, comparison.countB, comparison.timesB.wall, comparison.timesB.core);
+  contender('B', comparison.b, comparison.countB, comparison.timesB);
   fmt::print("  B / A  {}\n", spread(comparison.ratios(), ""));
 }
 
@@ -88,6 +102,10 @@ Json toJson(const Comparison& comparison) {
                {"core_seconds_b", comparison.timesB.core},
                {"check", {{"text", comparison.check.text}, {"passed", comparison.check.passed}}}};
   if (!comparison.b.empty()) json["b"] = comparison.b;
+  if (!comparison.timesA.stages.empty()) json["stages_a"] = comparison.timesA.stages;
+  if (!comparison.timesB.stages.empty()) json["stages_b"] = comparison.timesB.stages;
+  if (const auto& point = comparison.point)
+    json["figure"] = {{"number", point->figure}, {"title", point->title}, {"axis", point->axis}, {"x", point->x}};
   setRatios(json, comparison.ratios());
   return json;
 }
@@ -124,27 +142,45 @@ Bench::Bench(const std::string& name, const BenchOptions& options, const CommonO
 
 const Comparison* Bench::compare(const std::string& name, const std::string& unit, const Contender& a,
                                  const std::optional<Contender>& b, const std::function<BenchCheck()>& check) {
+  compareInTurn({{.name = name, .unit = unit, .a = a, .b = b, .check = check}});
+  return comparisons_.back().check.passed ? &comparisons_.back() : nullptr;
+}
+
+Comparison Bench::checked(const Trial& trial) const {
   Comparison comparison;
-  comparison.name = name;
-  comparison.unit = unit;
-  comparison.countA = a.count != 0 ? a.count : options_.count;
-  comparison.countB = !b ? comparison.countA : b->count != 0 ? b->count : options_.count;
-  comparison.a = a.name;
-  if (b) comparison.b = b->name;
-  Progress progress(name, 1 + options_.runs);
-  runOnce(a);
-  if (b) runOnce(*b);
-  progress.advance(1);
-  comparison.check = check();
-  for (int run = 0; run < options_.runs && comparison.check.passed; ++run) {
-    time(a, comparison.timesA);
-    if (b) time(*b, comparison.timesB);
+  comparison.name = trial.name;
+  comparison.unit = trial.unit;
+  comparison.countA = trial.a.count != 0 ? trial.a.count : options_.count;
+  comparison.countB = !trial.b ? comparison.countA : trial.b->count != 0 ? trial.b->count : options_.count;
+  comparison.a = trial.a.name;
+  if (trial.b) comparison.b = trial.b->name;
+  comparison.point = trial.point;
+  runOnce(trial.a);
+  if (trial.b) runOnce(*trial.b);
+  comparison.check = trial.check();
+  return comparison;
+}
+
+void Bench::compareInTurn(const std::vector<Trial>& trials) {
+  Progress progress(trials.front().name, static_cast<double>(trials.size()) * (1 + options_.runs));
+  std::vector<Comparison> comparisons;
+  for (const Trial& trial : trials) {
+    comparisons.push_back(checked(trial));
     progress.advance(1);
   }
-  print(comparison);
+  for (int run = 0; run < options_.runs; ++run) {
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      progress.advance(1);
+      if (!comparisons[i].check.passed) continue;
+      time(trials[i].a, comparisons[i].timesA);
+      if (trials[i].b) time(*trials[i].b, comparisons[i].timesB);
+    }
+  }
+  for (Comparison& comparison : comparisons) {
+    print(comparison);
+    comparisons_.push_back(std::move(comparison));
+  }
   if (std::fflush(stdout) != 0) throw MachineError("writing to stdout failed");  // the next one may take a minute
-  comparisons_.push_back(std::move(comparison));
-  return comparisons_.back().check.passed ? &comparisons_.back() : nullptr;
 }
 
 int Bench::finish(std::uint64_t floorCount) {

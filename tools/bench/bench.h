@@ -6,6 +6,7 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,15 +27,37 @@ struct BenchOptions {
 /// One way of doing it. `work` leaves its result where the check looks for it.
 struct Contender {
   std::string name;
-  std::function<void()> work;          ///< timed
-  std::function<void()> prepare = {};  ///< before each run, not timed
-  std::uint64_t count = 0;             ///< of what it works on; 0: the benchmark's own
+  std::function<void()> work;                             ///< timed
+  std::function<void()> prepare = {};                     ///< before each run, not timed
+  std::uint64_t count = 0;                                ///< of what it works on; 0: the benchmark's own
+  const std::map<std::string, double>* stages = nullptr;  ///< the last run's seconds, part by part (FrameStats)
 };
 
 /// Whether the contenders' results are right, and how that was seen.
 struct BenchCheck {
   std::string text;
   bool passed = false;
+};
+
+/// Right where both are.
+inline BenchCheck both(const BenchCheck& first, const BenchCheck& second) {
+  return {first.text + "; " + second.text, first.passed && second.passed};
+}
+
+/// Where a comparison stands in a figure of the thesis.
+struct FigurePoint {
+  int figure = 0;
+  std::string title, axis;  ///< axis: what varies
+  double x = 0;
+};
+
+/// A comparison that is wanted. Where there is nothing to run B on it is left out.
+struct Trial {
+  std::string name, unit;  ///< unit: of what `count` counts
+  Contender a;
+  std::optional<Contender> b;
+  std::function<BenchCheck()> check;  ///< after a run of both
+  std::optional<FigurePoint> point = {};
 };
 
 /// The seconds of one benchmark; without B where there is nothing to run it on.
@@ -44,6 +67,7 @@ struct Comparison {
   std::string a, b;
   BenchCheck check;
   RunTimes timesA, timesB;
+  std::optional<FigurePoint> point;
 
   double medianA() const { return median(timesA.wall); }
   double medianB() const { return median(timesB.wall); }
@@ -69,11 +93,15 @@ class Bench {
   std::uint64_t count() const { return options_.count; }
   /// Null where there is none.
   const Device* device() const { return gpu_ ? &gpu_->device() : nullptr; }
+  Gpu* gpu() const { return gpu_.get(); }
 
   /// Runs both once, checks, and if that passes times them; prints. The result is null where the check failed; it is
   /// valid until the next call.
   const Comparison* compare(const std::string& name, const std::string& unit, const Contender& a,
                             const std::optional<Contender>& b, const std::function<BenchCheck()>& check);
+  /// Several at once: runs and checks all of them, then times those that passed in turn, A B of the first, A B of the
+  /// second, …, as many times as there are runs; prints. So the machine's drift is in all of them alike.
+  void compareInTurn(const std::vector<Trial>& trials);
 
   void addFloor(Floor floor) { floors_.push_back(std::move(floor)); }
 
@@ -82,6 +110,8 @@ class Bench {
   int finish(std::uint64_t floorCount);
 
  private:
+  /// Both run once, and what they left checked.
+  Comparison checked(const Trial& trial) const;
   std::string reportJson() const;
 
   std::string name_;
@@ -91,8 +121,11 @@ class Bench {
   std::vector<Floor> floors_;
 };
 
-// Each runs one of `mote bench …`: lighting and octree, time per particle against particles, the bitonic sort, the
-// splat pass.
+// Each runs one of `mote bench …`: the thesis' figures, a whole frame from file to file, lighting and octree, time per
+// particle against particles, the bitonic sort, the splat pass.
+constexpr std::uint64_t kFiguresCount = 4'000'000, kFrameCount = 9'000'000;  // of full size
+void benchFigures(Bench& bench);
+void benchFrame(Bench& bench);
 void benchLighting(Bench& bench);
 void benchScaling(Bench& bench);
 void benchSort(Bench& bench);

@@ -73,10 +73,6 @@ BenchCheck sameLight(const std::vector<float>& first, const std::vector<float>& 
           beyond == 0};
 }
 
-BenchCheck both(const BenchCheck& first, const BenchCheck& second) {
-  return {first.text + "; " + second.text, first.passed && second.passed};
-}
-
 void addFloors(Bench& bench, const Comparison& times) {
   bench.addFloor(
       {"lighting on TBB [M rays/s]", static_cast<double>(bench.count()) / times.medianA() * 1e-6, kLeastRays, true});

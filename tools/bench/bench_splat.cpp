@@ -3,9 +3,8 @@
 #include "engine/passes/splat_pass.h"
 #include "host/core/parallel.h"
 #include "host/core/random.h"
-#include "host/image/compare.h"
 #include "host/splat/splat.h"
-#include "tools/bench/bench.h"
+#include "tools/bench/bench_picture.h"
 
 namespace mote {
 namespace {
@@ -13,7 +12,6 @@ namespace {
 constexpr int kWidth = 1280, kHeight = 720;
 constexpr float kPixels = 4;    // radius of a splat
 constexpr float kPeak = 0.05f;  // thin: a million of them have an optical depth of about 1, so every one counts
-constexpr double kWithin = 0.999, kRmse = 1e-3;  // as mote crosscheck
 
 layout::SplatCamera viewCamera() {
   return makeSplatCamera(vec3(0), vec3(0, 0, -1), vec3(0, 1, 0), 40, 0.1f, 100, kWidth, kHeight,
@@ -36,21 +34,6 @@ std::vector<layout::SplatParticle> randomSplats(std::uint64_t count, const layou
     }
   });
   return splats;
-}
-
-BenchCheck samePicture(const Image& host, const Image& device) {
-  const ImageDifference difference = compareImages(host, device);
-  return {fmt::format("pictures differ by RMSE {:.1e} (limit {:.0e}), {:.4f} % within 2/255 (limit {} %)",
-                      difference.overall.rmse, kRmse, difference.within * 100, kWithin * 100),
-          difference.overall.rmse <= kRmse && difference.within >= kWithin};
-}
-
-/// Without a device: the picture holds something, and nothing that is not finite.
-BenchCheck plausible(const Image& image) {
-  const ImageDifference fromBlack = compareImages(image, Image(image.width, image.height, false));
-  return {fmt::format("the picture's RMS is {:.3g}, {} pixels are not finite", fromBlack.overall.rmse,
-                      fromBlack.overall.notFinite),
-          fromBlack.overall.rmse > 0 && fromBlack.overall.notFinite == 0};
 }
 
 }  // namespace

@@ -15,11 +15,9 @@ import json
 import math
 import statistics
 import sys
-from xml.sax.saxutils import escape
 
-WIDTH, HEIGHT = 640, 400
-LEFT, RIGHT, TOP, BOTTOM = 70, 190, 20, 50  # margins; the right one holds the legend
-COLOURS = ["#1b6ca8", "#c0392b", "#2e7d32", "#7b1fa2"]
+import plot
+
 COLUMNS = ["series", "particles", "ns_per_particle", "relative", "relative_min", "relative_max",
            "cpu_ns_per_particle", "relative_cpu"]
 
@@ -65,55 +63,14 @@ def to_csv(rows):
     return out.getvalue()
 
 
-def count_text(count):
-    return "%g M" % (count / 1e6) if count >= 1e5 else "%g k" % (count / 1e3)
-
-
-def to_svg(rows, column="ns_per_particle"):
+def plot_of(rows, column="ns_per_particle"):
     value = COLUMNS.index(column)
-    counts = sorted({row[1] for row in rows})
-    least, most = min(row[value] for row in rows), max(row[value] for row in rows)
-    # Whole decades about the times.
-    low, high = math.floor(math.log10(least)), max(math.ceil(math.log10(most)), math.floor(math.log10(least)) + 1)
-
-    def x(count):
-        span = math.log(counts[-1] / counts[0]) or 1
-        return LEFT + (WIDTH - LEFT - RIGHT) * math.log(count / counts[0]) / span
-
-    def y(nanoseconds):
-        return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * (math.log10(nanoseconds) - low) / (high - low)
-
-    parts = ['<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 %d %d" font-family="sans-serif" font-size="12">'
-             % (WIDTH, HEIGHT), '<rect width="%d" height="%d" fill="white"/>' % (WIDTH, HEIGHT)]
-
-    def line(x1, y1, x2, y2, colour):
-        parts.append('<line x1="%.1f" y1="%.1f" x2="%.1f" y2="%.1f" stroke="%s"/>' % (x1, y1, x2, y2, colour))
-
-    def text(at_x, at_y, words, anchor="middle"):
-        parts.append('<text x="%.1f" y="%.1f" text-anchor="%s">%s</text>' % (at_x, at_y, anchor, escape(words)))
-
-    for decade in range(low, high + 1):
-        for digit in range(1, 10 if decade < high else 2):
-            at = y(digit * 10.0 ** decade)
-            line(LEFT, at, WIDTH - RIGHT, at, "#bbb" if digit == 1 else "#eee")
-        text(LEFT - 8, y(10.0 ** decade) + 4, "%g" % 10.0 ** decade, "end")
-    for count in counts:
-        line(x(count), TOP, x(count), HEIGHT - BOTTOM, "#eee")
-        text(x(count), HEIGHT - BOTTOM + 18, count_text(count))
-    text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 12, "particles")
-    parts.append('<text transform="translate(18 %.1f) rotate(-90)" text-anchor="middle">%s</text>'
-                 % ((TOP + HEIGHT - BOTTOM) / 2, column.replace("cpu", "CPU").replace("_", " ")))
-    names = list(dict.fromkeys(row[0] for row in rows))
-    for index, name in enumerate(names):
-        colour = COLOURS[index % len(COLOURS)]
-        points = [(x(row[1]), y(row[value])) for row in rows if row[0] == name]
-        parts.append('<polyline fill="none" stroke="%s" stroke-width="2" points="%s"/>'
-                     % (colour, " ".join("%.1f,%.1f" % point for point in points)))
-        parts += ['<circle cx="%.1f" cy="%.1f" r="3" fill="%s"/>' % (*point, colour) for point in points]
-        at = TOP + 14 + 20 * index
-        line(WIDTH - RIGHT + 12, at - 4, WIDTH - RIGHT + 32, at - 4, colour)
-        text(WIDTH - RIGHT + 38, at, name, "start")
-    return "\n".join(parts + ["</svg>"]) + "\n"
+    series = {}
+    for row in rows:
+        series.setdefault(row[0], []).append((row[1], row[value]))
+    x_axis = plot.Axis("particles", [row[1] for row in rows], ticks=True, log=True)
+    title = column.replace("cpu", "CPU").replace("_", " ")
+    return plot.to_svg(x_axis, plot.Axis(title, [row[value] for row in rows], log=True), series)
 
 
 def main(*arguments):
@@ -128,8 +85,8 @@ def main(*arguments):
             rows = rows_of(json.load(file))
         if options.csv is None:
             sys.stdout.write(to_csv(rows))
-        plot = to_svg(rows, "cpu_ns_per_particle" if options.cpu else "ns_per_particle")
-        for path, content in ((options.csv, to_csv(rows)), (options.svg, plot)):
+        picture = plot_of(rows, "cpu_ns_per_particle" if options.cpu else "ns_per_particle")
+        for path, content in ((options.csv, to_csv(rows)), (options.svg, picture)):
             if path is not None:
                 with open(path, "w", encoding="utf-8") as file:
                     file.write(content)

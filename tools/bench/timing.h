@@ -1,7 +1,9 @@
 // Seconds of runs in turn, and their ratios.
 #pragma once
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <vector>
 
 namespace mote {
@@ -10,6 +12,7 @@ namespace mote {
 struct RunTimes {
   std::vector<double> wall;  ///< seconds
   std::vector<double> core;  ///< CPU seconds of the process over all threads: what others' load disturbs least
+  std::map<std::string, std::vector<double>> stages{};  ///< wall-clock seconds of its parts, where it has any
 
   void time(const std::function<void()>& work);
 };
