@@ -144,8 +144,8 @@ class DeviceRasterizer : public Rasterizer {
     resident_.reset();
   }
 
-  /// draw(part, count) for all particles from back to front: at once where they are on the device, else in parts that
-  /// leave `reserved` bytes of it.
+  /// draw(part, count, advance) for all particles from back to front: at once where they are on the device, else in
+  /// parts that leave `reserved` bytes of its budget.
   template <class Draw>
   void drawInParts(std::uint64_t reserved, Progress& progress, const Draw& draw) {
     if (resident_) {
@@ -154,7 +154,8 @@ class DeviceRasterizer : public Rasterizer {
       return;
     }
     const auto most = static_cast<std::uint32_t>(partThatFits(
-        device_, count_, kLeastPart, [&](std::uint64_t count) { return drawnSizes(count); }, reserved, "the splats"));
+        device_, count_, kLeastPart, [&](std::uint64_t count) { return drawnSizes(count); },
+        std::max(reserved, device_.stagingCost()), "the splats"));
     const Drawn part = createDrawn(most);
     std::vector<layout::uint> sequence(most);
     std::iota(sequence.begin(), sequence.end(), 0u);

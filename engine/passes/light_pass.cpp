@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <utility>
 
 #include "engine/passes/part_size.h"
 #include "host/core/log.h"
@@ -258,6 +259,7 @@ std::vector<float> LightPass::opticalDepths(const Receivers& receivers, const la
   const Tuning t = tuning(device_);
   const float limit = opticalDepthLimit(light, options);
   Beams beams;
+  std::size_t passed = 0, reported = 0;  // rays: through one part each, through all parts
   for (std::size_t part = 0; part < parts_.size(); ++part) {
     if (parts_.size() > 1) release();
     load(part);
@@ -280,7 +282,9 @@ std::vector<float> LightPass::opticalDepths(const Receivers& receivers, const la
       const std::size_t rays = piece.rays.size();
       for (std::size_t c = 0; c < tree_->channels(); ++c)
         for (std::size_t k = 0; k < rays; ++k) depths[c * count + piece.receivers[k]] += sums[c * rays + k];
-      if (done) done(rays * (part + 1) / parts_.size() - rays * part / parts_.size());
+      passed += rays;
+      const std::size_t whole = passed / parts_.size();
+      if (done) done(whole - std::exchange(reported, whole));
     }
   }
   return depths;
