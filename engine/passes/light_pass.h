@@ -37,7 +37,8 @@ class LightPass {
   /// cutoff 0. Needs on the device, beside the tree and however many receivers there are, about 65 MiB on CPU devices
   /// and 500 MiB on others, or what the budget leaves of it, 3 MiB at least; on the host 16 bytes a receiver.
   /// A tree in parts is passed once a part, which copies it to the device once a light; sums are then in another order,
-  /// so T differs from that of the whole tree by rounding. A ray that one part has made dark meets no later one.
+  /// so T differs from that of the whole tree by rounding and, as ever, by at most the cutoff: a ray that one part has
+  /// made dark meets no later one.
   std::vector<float> opticalDepths(const Receivers& receivers, const layout::Light& light,
                                    const LightingOptions& options, std::span<const std::uint8_t> reached = {},
                                    const RaysDone& done = {});
