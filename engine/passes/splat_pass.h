@@ -22,7 +22,8 @@ struct SplatTarget {
 class SplatPass {
  public:
   /// Points of one submission: a second on a software device, far below the watchdog of a hardware driver. lavapipe
-  /// keeps all of a submission's quads in memory that is no device's: 0.8 GB more for 4 M at once (docs/performance.md).
+  /// keeps all of a submission's quads in memory that is no device's: 0.8 GB more for 4 M at once
+  /// (docs/performance.md).
   static constexpr std::uint32_t kPointsPerSubmit = 1u << 20;
 
   /// `falloff` kFalloff…; `withDepth` adds the depth layer Z; `pointsPerSubmit` > 0 is what draw() submits at once.
