@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "engine/splats.h"
-#include "engine/surface_light.h"
 #include "host/core/parallel.h"
 #include "host/core/timer.h"
 #include "host/splat/full_footprint.h"
@@ -108,21 +107,20 @@ ImageLayer shadowLayer(const std::string& light, const Surfaces& surfaces, const
 }  // namespace
 
 Image makePicture(const Frame& frame, const Scene& scene, LitParticles lit, const Surfaces& surfaces,
-                  Rasterizer& rasterizer, const ShadowSources& sources, FrameStats& stats) {
+                  std::vector<SurfaceLight> surfaceLights, Rasterizer& rasterizer, FrameStats& stats) {
   std::vector<ImageLayer> shadows;
   std::vector<SurfaceRadiance> byLight;
   SurfaceRadiance total(surfaces.all.size(), vec3(0));
   const std::size_t pixels =
       static_cast<std::size_t>(scene.output.size.x) * static_cast<std::size_t>(scene.output.size.y);
-  Timer timer;
+  surfaceLights.resize(frame.lights.size());  // empty ones where there are no surfaces
   for (std::size_t l = 0; l < frame.lights.size(); ++l) {
-    SurfaceLight own;
-    if (!surfaces.empty()) own = lightSurfaces(frame, scene, surfaces, frame.lights[l], sources);
+    SurfaceLight& own = surfaceLights[l];
     for (std::size_t i = 0; i < total.size(); ++i) total[i] += own.radiance[i];
     if (scene.output.shadow) shadows.push_back(shadowLayer(frame.lightNames[l], surfaces, own.shadow, pixels));
     byLight.push_back(std::move(own.radiance));
   }
-  if (!surfaces.empty()) stats.seconds["lighting"] += timer.lap();
+  surfaceLights.clear();
   Composer composer(scene, surfaces, rasterizer, stats);
   Image picture = composer.compose(total, layersOf(frame, scene.output));
   picture.layers = std::move(shadows);

@@ -5,13 +5,14 @@
 
 #include "engine/lighting.h"
 #include "engine/rasterizer.h"
+#include "engine/surface_light.h"
 #include "host/image/image.h"
 #include "host/solids/surfaces.h"
 
 namespace mote {
 
-/// Draws the medium before, beside and between the surfaces, lights these, and lays both over each other, each with its
-/// share of the pixel:
+/// Draws the medium before, beside and between the surfaces, and lays both over each other, each with its share of the
+/// pixel:
 ///   radiance Σ coverage · (medium before the surface + (1 − its α) · surface);   α likewise, holdouts counting as 0
 ///   Z                the nearest of the medium's and of shaded surfaces' depths
 ///   optical_depth    of the medium up to the surface, weighted by coverage
@@ -19,9 +20,10 @@ namespace mote {
 ///   shadow.<light>   T · S at the surfaces, weighted by coverage; 1 where there is none. Holdouts have it as well
 ///   light.<name>.*   the picture by one light alone; `emission.*` what the particles give out. Their sum is the
 ///   picture
-/// `lit` is taken apart on the way. `sources` light the surfaces. The seconds of that go to stats' "lighting", those of
-/// laying surfaces and medium over each other to "solids"; the rasteriser counts its own.
+/// `lit` is taken apart on the way. `surfaceLights` are the lights on the surfaces, one a light of the frame, none
+/// where there are no surfaces. The seconds of laying surfaces and medium over each other go to stats' "solids"; the
+/// rasteriser counts its own.
 Image makePicture(const Frame& frame, const Scene& scene, LitParticles lit, const Surfaces& surfaces,
-                  Rasterizer& rasterizer, const ShadowSources& sources, FrameStats& stats);
+                  std::vector<SurfaceLight> surfaceLights, Rasterizer& rasterizer, FrameStats& stats);
 
 }  // namespace mote

@@ -1,9 +1,15 @@
 #include "engine/rasterizer.h"
 
 #include <algorithm>
+#include <functional>
+#include <numeric>
+#include <optional>
+#include <utility>
 
 #include "engine/passes/depth_key_pass.h"
+#include "engine/passes/depth_order.h"
 #include "engine/passes/full_splat_pass.h"
+#include "engine/passes/part_size.h"
 #include "engine/passes/sort_pass.h"
 #include "engine/passes/splat_pass.h"
 #include "engine/vulkan/barrier.h"
@@ -50,6 +56,8 @@ class HostRasterizer : public Rasterizer {
   std::vector<layout::uint> order_;
 };
 
+/// Where particles, pairs and order fit on the device at once, all of it is done and kept there. Else runs are sorted
+/// there, and every picture is drawn in parts from back to front: the same order, and the same blending.
 class DeviceRasterizer : public Rasterizer {
  public:
   DeviceRasterizer(const Device& device, SplatSet set, float keyScale, FrameStats& stats)
@@ -58,73 +66,143 @@ class DeviceRasterizer : public Rasterizer {
         stats_(stats),
         count_(static_cast<std::uint32_t>(set_.particles.size())) {
     Timer timer;
-    particles_ = device.createBufferWith<layout::SplatParticle>(set_.particles);
-    indices_ = device.createBuffer(count_ * sizeof(std::uint32_t));
-    const Buffer pairs = device.createBuffer(SortPass::pairBytes(count_));
-    const DepthKeyPass keys(device);
-    const SortPass sort(device);
-    TimestampQueries queries = device.createTimestampQueries(1);
-    device.run([&](CommandBuffer& commands) {
-      const std::uint32_t span = queries.begin(commands, "sort");
-      keys.record(commands, particles_, count_, set_.camera().position, keyScale, pairs, viewAxis(set_.camera()));
-      sort.record(commands, pairs, count_);
-      sort.recordExtract(commands, pairs, count_, indices_);
-      queries.end(commands, span);
-      commands.barrier(barrier::computeToIndexAndVertexInput);
-    });
-    for (const StageTime& time : queries.results()) stats_.deviceSeconds[time.stage] += time.seconds;
-    holds(particles_.size() + indices_.size() + pairs.size());
+    std::vector<std::uint64_t> sizes = drawnSizes(count_);
+    sizes.push_back(SortPass::pairBytes(count_));
+    if (count_ <= SortPass::kMaxCount && arraysFit(device, sizes, device.stagingCost()))
+      sortAtOnce(keyScale);
+    else
+      order_ = depthOrderInRuns(device, set_.particles, set_.camera(), keyScale, stats_.deviceSeconds["sort"]);
     stats_.seconds["sort"] += timer.lap();
   }
 
   Image draw(std::span<const float> surfaces, SplatLayers layers) override {
     Timer timer;
     Progress progress("splat", count_);
-    std::uint32_t drawn = 0;
-    const auto advance = [&](std::uint32_t soFar) {
-      progress.advance(soFar - drawn);
-      drawn = soFar;
-    };
-    Image image = fast(set_, surfaces, layers) ? drawFast(layers.depth, advance) : drawFull(surfaces, layers, advance);
+    Image image =
+        fast(set_, surfaces, layers) ? drawFast(layers.depth, progress) : drawFull(surfaces, layers, progress);
     stats_.seconds["splat"] += timer.lap();
     return image;
   }
 
   void relight(std::vector<layout::SplatParticle> particles, bool emission) override {
     set_.particles = std::move(particles);
-    if (particles_.size() > 0) device_.upload<layout::SplatParticle>(particles_, set_.particles);
     if (!emission) set_.emission.clear();
-    if (full_) full_->drawEmission(emission);
+    if (!resident_) return;
+    device_.upload<layout::SplatParticle>(resident_->splats.particles, set_.particles);
+    if (!emission) resident_->splats.emission = {};
   }
 
   const SplatSet& set() const override { return set_; }
 
   const std::vector<layout::uint>& order() const override {
-    if (order_.empty()) order_ = device_.download<layout::uint>(indices_, count_);
+    if (order_.empty() && resident_) order_ = device_.download<layout::uint>(resident_->indices, count_);
     return order_;
   }
 
  private:
-  void holds(std::uint64_t bytes) { stats_.deviceBytes = std::max(stats_.deviceBytes, bytes); }
+  /// The particles, or a part of them, and the order in which they are drawn.
+  struct Drawn {
+    SplatBuffers splats;
+    Buffer indices;
+  };
+  std::vector<std::uint64_t> drawnSizes(std::uint64_t count) const {
+    std::vector<std::uint64_t> sizes = SplatBuffers::sizes(set_, count);
+    sizes.push_back(count * sizeof(layout::uint));
+    return sizes;
+  }
+  Drawn createDrawn(std::uint64_t count) const {
+    return {SplatBuffers(device_, set_, count), device_.createBuffer(count * sizeof(layout::uint))};
+  }
 
-  Image drawFast(bool withDepth, const std::function<void(std::uint32_t)>& advance) {
-    const layout::SplatCamera& camera = set_.camera();
-    const SplatPass pass(device_, camera.falloff, withDepth);
-    const SplatTarget target = pass.createTarget(static_cast<std::uint32_t>(camera.imageSize.x),
-                                                 static_cast<std::uint32_t>(camera.imageSize.y));
-    TimestampQueries queries = device_.createTimestampQueries(pass.submissions(count_));
-    pass.draw(target, particles_, indices_, count_, camera, &queries, advance);
+  void sortAtOnce(float keyScale) {
+    resident_ = createDrawn(count_);
+    const Buffer& particles = resident_->splats.particles;
+    resident_->splats.upload(device_, set_);
+    const Buffer pairs = device_.createBuffer(SortPass::pairBytes(count_));
+    const DepthKeyPass keys(device_);
+    const SortPass sort(device_);
+    TimestampQueries queries = device_.createTimestampQueries(1);
+    device_.run([&](CommandBuffer& commands) {
+      const std::uint32_t span = queries.begin(commands, "sort");
+      keys.record(commands, particles, count_, set_.camera().position, keyScale, pairs, viewAxis(set_.camera()));
+      sort.record(commands, pairs, count_);
+      sort.recordExtract(commands, pairs, count_, resident_->indices);
+      queries.end(commands, span);
+      commands.barrier(barrier::computeToIndexAndVertexInput);
+    });
+    addTimes(queries);
+  }
+
+  void addTimes(const TimestampQueries& queries) {
     for (const StageTime& time : queries.results()) stats_.deviceSeconds[time.stage] += time.seconds;
+  }
+
+  /// Takes the particles from the device where they leave less than `bytes` for a drawing.
+  void makeRoom(std::uint64_t bytes) {
+    if (!resident_ || bytes <= device_.budget().room()) return;
+    order();
+    resident_.reset();
+  }
+
+  /// draw(part, count, advance) for all particles from back to front: at once where they are on the device, else in
+  /// parts that leave `reserved` bytes of its budget.
+  template <class Draw>
+  void drawInParts(std::uint64_t reserved, Progress& progress, const Draw& draw) {
+    if (resident_) {
+      std::uint32_t drawn = 0;
+      draw(*resident_, count_, [&](std::uint32_t soFar) { progress.advance(soFar - std::exchange(drawn, soFar)); });
+      return;
+    }
+    const auto most = static_cast<std::uint32_t>(partThatFits(
+        device_, count_, kLeastPart, [&](std::uint64_t count) { return drawnSizes(count); },
+        std::max(reserved, device_.stagingCost()), "the splats"));
+    const Drawn part = createDrawn(most);
+    std::vector<layout::uint> sequence(most);
+    std::iota(sequence.begin(), sequence.end(), 0u);
+    device_.upload<layout::uint>(part.indices, sequence);
+    std::uint32_t first = 0, parts = 0;
+    do {  // at least once: without particles the picture must still be cleared
+      const std::uint32_t count = std::min(most, count_ - first);
+      part.splats.upload(device_, set_, std::span(order_).subspan(first, count));
+      draw(part, count, {});
+      progress.advance(count);
+      first += count, ++parts;
+    } while (first < count_);
+    logVerbose(fmt::format("splats: {} parts of at most {} particles", parts, most));
+  }
+
+  Image drawFast(bool withDepth, Progress& progress) {
+    const layout::SplatCamera& camera = set_.camera();
+    const auto width = static_cast<std::uint32_t>(camera.imageSize.x),
+               height = static_cast<std::uint32_t>(camera.imageSize.y);
+    const SplatPass pass(device_, camera.falloff, withDepth);
+    makeRoom(pass.drawingCost(width, height));
+    const SplatTarget target = pass.createTarget(width, height);
+    bool keep = false;
+    drawInParts(pass.downloadCost(width, height), progress,
+                [&](const Drawn& part, std::uint32_t count, const std::function<void(std::uint32_t)>& advance) {
+                  TimestampQueries queries = device_.createTimestampQueries(pass.submissions(count));
+                  pass.draw(target, part.splats.particles, part.indices, count, camera, &queries, advance, keep);
+                  keep = true;
+                  addTimes(queries);
+                });
     return pass.download(target);
   }
 
-  Image drawFull(std::span<const float> surfaces, SplatLayers layers,
-                 const std::function<void(std::uint32_t)>& advance) {
-    if (!full_) full_ = std::make_unique<FullSplatPass>(device_, set_, particles_);
+  Image drawFull(std::span<const float> surfaces, SplatLayers layers, Progress& progress) {
+    if (!full_) {
+      makeRoom(FullSplatPass::ownCost(device_, set_));
+      full_ = std::make_unique<FullSplatPass>(device_, set_);
+    }
     const double before = full_->deviceSeconds();
-    Image image = full_->draw(indices_, count_, surfaces, layers, advance);
+    makeRoom(full_->drawingCost(!surfaces.empty(), layers));
+    full_->begin(surfaces, layers);
+    drawInParts(full_->downloadCost(), progress,
+                [&](const Drawn& part, std::uint32_t count, const std::function<void(std::uint32_t)>& advance) {
+                  full_->draw(part.splats, part.indices, count, advance);
+                });
+    Image image = full_->finish();
     stats_.deviceSeconds["splat"] += full_->deviceSeconds() - before;
-    holds(particles_.size() + full_->deviceBytes());
     return image;
   }
 
@@ -132,9 +210,9 @@ class DeviceRasterizer : public Rasterizer {
   SplatSet set_;
   FrameStats& stats_;
   std::uint32_t count_;
-  Buffer particles_, indices_;
+  std::optional<Drawn> resident_;            // all of them, in the set's order; empty: drawn in parts
+  mutable std::vector<layout::uint> order_;  // empty while it is only on the device
   std::unique_ptr<FullSplatPass> full_;
-  mutable std::vector<layout::uint> order_;
 };
 
 }  // namespace

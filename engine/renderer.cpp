@@ -7,6 +7,7 @@
 #include "engine/passes/solid_pass.h"
 #include "engine/picture.h"
 #include "engine/splats.h"
+#include "engine/surface_light.h"
 #include "host/core/error.h"
 #include "host/core/log.h"
 #include "host/core/parallel.h"
@@ -68,28 +69,48 @@ struct DeviceShadows {
 
   DeviceShadows(const Device& device, const Frame& frame)
       : light(device, frame.rules.falloff, frame.rules.endpoint), solids(device) {
-    light.setTree(frame.density.tree());
     if (!frame.solidTree.empty()) solids.setTree(frame.solidTree);
+    light.setTree(frame.density.tree());  // into what is left
   }
 
   ShadowSources sources(const Frame& frame) {
     return {.opticalDepths =
                 [&](const Receivers& receivers, const layout::Light& from, std::span<const std::uint8_t> reached,
                     const RaysDone& done) { return light.opticalDepths(receivers, from, frame.rules, reached, done); },
-            .occluded = [&](const Receivers& receivers, std::span<const std::uint8_t> wanted,
-                            const layout::Light& from) { return solids.occluded(receivers, wanted, from); }};
+            .occluded =
+                [&](const Receivers& receivers, std::span<const std::uint8_t> wanted, const layout::Light& from) {
+                  light.release();
+                  return solids.occluded(receivers, wanted, from);
+                }};
   }
 
   void addTo(FrameStats& stats) const {
     stats.deviceSeconds["lighting"] += light.deviceSeconds() + solids.deviceSeconds();
-    stats.deviceBytes = std::max(stats.deviceBytes, light.deviceBytes() + solids.deviceBytes());
   }
+};
+
+/// Adds the most device memory that was held while it lived to the statistics.
+class DevicePeak {
+ public:
+  DevicePeak(const Gpu* gpu, FrameStats& stats) : gpu_(gpu), stats_(stats) {
+    if (gpu_) gpu_->device().restartPeak();
+  }
+  ~DevicePeak() {
+    if (gpu_) stats_.deviceBytes = std::max(stats_.deviceBytes, gpu_->device().budget().peak());
+  }
+  DevicePeak(const DevicePeak&) = delete;
+  DevicePeak& operator=(const DevicePeak&) = delete;
+
+ private:
+  const Gpu* gpu_;
+  FrameStats& stats_;
 };
 
 }  // namespace
 
 LitParticles Renderer::light(const Frame& frame, LightWanted wanted, FrameStats& stats) {
   Timer timer;
+  const DevicePeak peak(gpu_, stats);
   LitParticles lit;
   if (backends_.gpuLighting) {
     DeviceShadows device(gpu_->device(), frame);
@@ -105,14 +126,20 @@ LitParticles Renderer::light(const Frame& frame, LightWanted wanted, FrameStats&
 Image Renderer::draw(const Frame& frame, const Scene& scene, LitParticles lit, FrameStats& stats,
                      std::vector<layout::uint>* order) {
   Timer timer;
+  const DevicePeak peak(gpu_, stats);
   Surfaces surfaces;
   const bool seen = std::any_of(scene.solids.begin(), scene.solids.end(),
                                 [](const Solid& solid) { return solid.mode != SolidMode::Hidden; });
   if (seen) surfaces = traceSurfaces(scene.solids, frame.meshes, frame.view);
   if (seen) stats.seconds["solids"] += timer.lap();
-  std::optional<DeviceShadows> device;
-  if (!surfaces.empty() && backends_.gpuLighting) {
-    device.emplace(gpu_->device(), frame);
+  std::vector<SurfaceLight> surfaceLights;
+  if (!surfaces.empty()) {
+    std::optional<DeviceShadows> device;  // gone before the splats need the memory
+    if (backends_.gpuLighting) device.emplace(gpu_->device(), frame);
+    const ShadowSources sources = device ? device->sources(frame) : hostShadows(frame);
+    for (const layout::Light& light : frame.lights)
+      surfaceLights.push_back(lightSurfaces(frame, scene, surfaces, light, sources));
+    if (device) device->addTo(stats);
     stats.seconds["lighting"] += timer.lap();
   }
 
@@ -126,10 +153,7 @@ Image Renderer::draw(const Frame& frame, const Scene& scene, LitParticles lit, F
                                                      ? deviceRasterizer(gpu_->device(), std::move(set), keyScale, stats)
                                                      : hostRasterizer(std::move(set), keyScale, stats);
   if (order) *order = rasterizer->order();
-  Image image = makePicture(frame, scene, std::move(lit), surfaces, *rasterizer,
-                            device ? device->sources(frame) : hostShadows(frame), stats);
-  if (device) device->addTo(stats);
-  return image;
+  return makePicture(frame, scene, std::move(lit), surfaces, std::move(surfaceLights), *rasterizer, stats);
 }
 
 }  // namespace mote

@@ -27,7 +27,8 @@ class Renderer {
   /// `gpu` may be null where `backends` names no device; it must outlive the renderer.
   Renderer(Backends backends, Gpu* gpu);
 
-  /// Lights the particles; adds seconds["lighting"] and, on the device, deviceSeconds["lighting"].
+  /// Lights the particles; adds seconds["lighting"] and, on the device, deviceSeconds["lighting"] and deviceBytes.
+  /// Where the device's budget is too small for the tree, it is passed in parts, and draw() sorts and splats in parts.
   LitParticles light(const Frame& frame, LightWanted wanted, FrameStats& stats);
 
   /// Sorts, splats, and lays solids and medium over each other, with the layers of scene.output (picture.h); adds

@@ -30,7 +30,7 @@ struct FrameStats {
   /// surfaces), sort, splat, write, total; solids (tree, camera rays, compositing) where there are any.
   std::map<std::string, double> seconds;
   std::map<std::string, double> deviceSeconds;  ///< the GPU's own clock (timestamps): lighting, sort, splat
-  std::uint64_t deviceBytes = 0;                ///< most device memory held at once by one stage
+  std::uint64_t deviceBytes = 0;                ///< most device memory held at once, of lighting and drawing
   double densityScale = 1;
   double subsample = 1;                  ///< share of the particles in the octree …
   std::optional<double> subsampleError;  ///< … and its mean |ΔT|: 0 for all, else empty unless measured on this frame

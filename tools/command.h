@@ -10,9 +10,10 @@ namespace mote {
 
 /// The flags that stand before or after any subcommand.
 struct CommonOptions {
-  unsigned threads = 0;   ///< 0: one a core
-  std::string device;     ///< Vulkan device by number or part of its name; empty: the best
-  bool validate = false;  ///< validation and synchronization layers on; any message makes the command fail with 3
+  unsigned threads = 0;      ///< 0: one a core
+  std::string device;        ///< Vulkan device by number or part of its name; empty: the best
+  std::string deviceMemory;  ///< how much of its memory may be held; empty: MemoryLimit's default
+  bool validate = false;     ///< validation and synchronization layers on; any message makes the command fail with 3
   bool quiet = false, verbose = false;
 };
 

@@ -31,6 +31,10 @@ void addCommonOptions(CLI::App& app, CommonOptions& common) {
       ->check(CLI::Range(0, kMaxThreads).description(""));
   app.add_option("--device", common.device, "Vulkan device, by its number or a part of its name (see mote devices)")
       ->type_name("N|NAME");
+  app.add_option("--device-memory", common.deviceMemory,
+                 "Memory of the device that may be held: bytes, 512M, 1.5G or 80% (default 90%); what does not fit is "
+                 "worked on in parts")
+      ->type_name("SIZE");
   app.add_flag("--validate", common.validate,
                "Turn the Vulkan validation layers on; any message of theirs is a failure");
   CLI::Option* quiet = app.add_flag("-q,--quiet", common.quiet, "Print nothing but errors to stderr");
@@ -95,7 +99,7 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.fallthrough();  // the subcommands, made after it, inherit it: common flags may follow them
   app.footer(
-      "Any command also takes --threads, --device, --validate, -q and -v (mote --help).\n"
+      "Any command also takes --threads, --device, --device-memory, --validate, -q and -v (mote --help).\n"
       "Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage, 3 the machine (device, memory, disk), "
       "130 interrupted.");
   addCommonOptions(app, common);

@@ -25,6 +25,7 @@ void addSceneOptions(CLI::App& command, SceneOptions& options);
 /// "cpu", "gpu" or "auto"; throws InputError naming `flag` otherwise. Empty keeps `fallback`.
 Backend parseBackend(const std::string& flag, const std::string& text, Backend fallback);
 
+/// The device that the flags ask for; throws InputError for a memory limit that is none.
 DeviceOptions deviceOptions(const CommonOptions& common);
 
 /// Any message of the validation layers makes the run a failure of the machine: throws MachineError with all of them.

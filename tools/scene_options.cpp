@@ -1,6 +1,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <string_view>
 
 #include "host/core/error.h"
 #include "host/image/exr.h"
@@ -25,8 +27,31 @@ Backend parseBackend(const std::string& flag, const std::string& text, Backend f
   throw InputError(flag, "", "cpu, gpu or auto", "\"" + text + "\"");
 }
 
+namespace {
+
+/// "1500000", "512M", "1.5G" (K, M, G, T: powers of 1024) or "80%" of the device's heap; empty: the default.
+MemoryLimit parseDeviceMemory(const std::string& text) {
+  if (text.empty()) return {};
+  double value = 0;
+  const char* const last = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), last, value, std::chars_format::fixed);
+  const std::string unit(end, last);
+  constexpr std::string_view kUnits = "KMGT";
+  const std::size_t power = unit.size() == 1 ? kUnits.find(unit[0]) : std::string_view::npos;
+  const bool known = unit.empty() || unit == "%" || power != std::string_view::npos;
+  if (error == std::errc() && known && unit == "%" && value > 0 && value <= 100) return {.share = value / 100};
+  const double bytes = power == std::string_view::npos ? value : std::ldexp(value, 10 * (static_cast<int>(power) + 1));
+  // A double is exact up to 2⁵³, far more than any device has.
+  if (error == std::errc() && known && unit != "%" && bytes >= 1 && bytes <= 0x1p53)
+    return {.bytes = static_cast<std::uint64_t>(bytes)};
+  throw InputError("--device-memory", "", "bytes (1500000, 512M, 1.5G), or a share of the device's memory up to 100%",
+                   "\"" + text + "\"");
+}
+
+}  // namespace
+
 DeviceOptions deviceOptions(const CommonOptions& common) {
-  return {.device = common.device, .validate = common.validate};
+  return {.device = common.device, .validate = common.validate, .memory = parseDeviceMemory(common.deviceMemory)};
 }
 
 void requireNoValidationMessages(const Gpu* gpu) {

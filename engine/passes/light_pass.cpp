@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
+#include <utility>
 
+#include "engine/passes/part_size.h"
 #include "host/core/log.h"
 #include "host/core/parallel.h"
 #include "host/lighting/beam.h"
@@ -31,17 +34,18 @@ constexpr double kExactRadii = 128;
 /// 8, 40960, which leaves enough for the rest; with wider ones less, as a list is no longer then and a group no larger.
 constexpr std::uint32_t kFoundPerLanes = 128;
 
-/// Points as (x, y, z, w) with w from `fourth`, interleaved in pieces: no second copy of all on the host.
-Buffer uploadPoints(const Device& device, const Receivers& points, std::span<const float> fourth) {
+/// A buffer of at(0) … at(count − 1), made in pieces: no second copy of all on the host.
+template <class T, class At>
+Buffer uploadEach(const Device& device, std::size_t count, const At& at) {
   constexpr std::size_t kPiece = 1 << 20;
-  Buffer buffer = device.createBuffer(points.size() * sizeof(vec4));
-  std::vector<vec4> piece;
-  for (std::size_t begin = 0; begin < points.size(); begin += kPiece) {
-    piece.resize(std::min(kPiece, points.size() - begin));
+  Buffer buffer = device.createBuffer(count * sizeof(T));
+  std::vector<T> piece;
+  for (std::size_t begin = 0; begin < count; begin += kPiece) {
+    piece.resize(std::min(kPiece, count - begin));
     parallelBlocks(piece.size(), 1 << 14, [&](std::size_t first, std::size_t last) {
-      for (std::size_t i = first; i < last; ++i) piece[i] = vec4(points.position(begin + i), fourth[begin + i]);
+      for (std::size_t i = first; i < last; ++i) piece[i] = at(begin + i);
     });
-    device.upload<vec4>(buffer, piece, begin);
+    device.upload<T>(buffer, piece, begin);
   }
   return buffer;
 }
@@ -108,8 +112,11 @@ struct BeamBoxes {
   }
 };
 
-layout::LightRay rayOf(const BeamRays& rays, std::size_t k) {
-  return {rays.u[k], rays.v[k], rays.depth[k], rays.self[k], rays.uLow[k], rays.vLow[k], rays.depthLow[k]};
+/// For a tree that has the slots [firstSlot, endSlot) alone.
+layout::LightRay rayOf(const BeamRays& rays, std::size_t k, std::uint32_t firstSlot, std::uint32_t endSlot) {
+  const std::uint32_t slot = rays.self[k];
+  const std::uint32_t self = slot >= firstSlot && slot < endSlot ? slot - firstSlot : kNoSlot;
+  return {rays.u[k], rays.v[k], rays.depth[k], self, rays.uLow[k], rays.vLow[k], rays.depthLow[k]};
 }
 
 }  // namespace
@@ -135,14 +142,6 @@ LightPass::Tuning LightPass::tuning(const Device& device) {
     t.pieceColumns = 512, t.pieceBeams = 2048, t.pieceRays = 1 << 19;
   }
   return t;
-}
-
-std::uint64_t LightPass::Buffers::bytes() const {
-  std::uint64_t sum = 0;
-  for (const Buffer* buffer :
-       {&columns, &planes, &walks, &beams, &rays, &depths, &found, &order, &chosen, &chosenIndex})
-    sum += buffer->size();
-  return sum;
 }
 
 LightPass::LightPass(const Device& device, layout::uint falloff, layout::uint endpoint)
@@ -181,13 +180,67 @@ void LightPass::setTree(const Octree& tree) {
   tree_ = &tree;
   greatestRadius_ = tree.radius.empty() ? 0 : *std::max_element(tree.radius.begin(), tree.radius.end());
   gathers_.clear(), sums_.clear();
-  const std::size_t count = tree.particleCount();
-  nodes_ = device_.createBufferWith<layout::Node>(tree.nodes);
-  peaks_ = device_.createBuffer(tree.channels() * count * sizeof(float));
-  const std::vector<float>* peaks[] = {&tree.peak, &tree.peakGreen, &tree.peakBlue};
-  for (std::size_t c = 0; c < tree.channels(); ++c)
-    device_.upload<float>(peaks_, std::span(*peaks[c]).first(count), c * count);
-  particles_ = uploadPoints(device_, slotsOf(tree), tree.radius);
+  nodes_ = {}, particles_ = {}, peaks_ = {};
+  release();
+  parts_.clear();
+  loaded_ = 0;
+  if (tree.particleCount() == 0) return;
+  const auto end = static_cast<std::uint32_t>(tree.nodeCount());
+  const auto partOf = [&](std::uint32_t first, std::uint64_t nodes) {
+    const auto past = first + static_cast<std::uint32_t>(nodes);
+    return Part{first, past, tree.nodes[first].first, tree.nodes[past].first};
+  };
+  const auto sizesFrom = [&](std::uint32_t first) {
+    return [&, first](std::uint64_t nodes) { return partSizes(partOf(first, nodes)); };
+  };
+  const Tuning t = tuning(device_);
+  const auto costOf = [&](const Extent& extent) {
+    return arraysCost(device_, bufferSizes(extent)) + device_.stagingCost();
+  };
+  std::uint64_t beside = costOf({t.pieceColumns, t.pieceBeams, t.pieceRays});
+  if (!arraysFit(device_, sizesFrom(0)(end), beside)) {
+    // A quarter for the rays: more would pass the tree in more parts, less would leave much of a device idle. One
+    // column must fit, with a quarter more rays and beams than it has as a rule.
+    const std::size_t columnBeams = t.beams.columnRays / t.beams.beamRays;
+    const std::uint64_t least = costOf({1, columnBeams + columnBeams / 4, t.beams.columnRays + t.beams.columnRays / 4});
+    beside = std::min(beside, std::max(least, device_.budget().room() / 4));
+  }
+  for (std::uint32_t first = 0; first < end;) {
+    const std::uint64_t nodes =
+        partThatFits(device_, end - first, 1, sizesFrom(first), beside, "the octree and its rays");
+    parts_.push_back(partOf(first, nodes));
+    first = parts_.back().endNode;
+  }
+  loaded_ = parts_.size();
+  if (parts_.size() > 1) logVerbose(fmt::format("octree: {} parts on the device", parts_.size()));
+}
+
+std::vector<std::uint64_t> LightPass::partSizes(const Part& part) const {
+  const std::uint64_t slots = part.endSlot - part.firstSlot;
+  return {(part.endNode - part.firstNode + std::uint64_t{1}) * sizeof(layout::Node), slots * sizeof(vec4),
+          tree_->channels() * slots * sizeof(float)};
+}
+
+void LightPass::load(std::size_t part) {
+  if (loaded_ == part) return;
+  loaded_ = parts_.size();
+  nodes_ = {}, particles_ = {}, peaks_ = {};
+  const Part& own = parts_[part];
+  // The node behind the last says where the last one's particles end, and a skip beyond it ends the walk.
+  nodes_ = uploadEach<layout::Node>(device_, own.endNode - own.firstNode + 1, [&](std::size_t i) {
+    layout::Node node = tree_->nodes[own.firstNode + i];
+    node.first -= own.firstSlot, node.skip -= own.firstNode;
+    return node;
+  });
+  const std::size_t count = own.endSlot - own.firstSlot;
+  particles_ = uploadEach<vec4>(device_, count, [&](std::size_t i) {
+    return vec4(tree_->position(own.firstSlot + i), tree_->radius[own.firstSlot + i]);
+  });
+  peaks_ = device_.createBuffer(tree_->channels() * count * sizeof(float));
+  const std::vector<float>* peaks[] = {&tree_->peak, &tree_->peakGreen, &tree_->peakBlue};
+  for (std::size_t c = 0; c < tree_->channels(); ++c)
+    device_.upload<float>(peaks_, std::span(*peaks[c]).subspan(own.firstSlot, count), c * count);
+  loaded_ = part;
 }
 
 std::vector<float> LightPass::opticalDepths(const layout::Light& light, const LightingOptions& options,
@@ -204,22 +257,88 @@ std::vector<float> LightPass::opticalDepths(const Receivers& receivers, const la
   std::vector<float> depths(tree_->channels() * count, 0.0f);
   if (shadowless(light) || tree_->particleCount() == 0) return depths;
   const Tuning t = tuning(device_);
-  const Beams beams = planBeams(receivers, light, reached, tree_->meanRadius, t.beams);
   const float limit = opticalDepthLimit(light, options);
-  for (std::size_t first = 0, last = 0; first < beams.columns(); first = last) {
-    const auto fits = [&](std::size_t end) {
-      return end - first <= t.pieceColumns && beams.column[end] - beams.column[first] <= t.pieceBeams &&
-             beams.start[beams.column[end]] - beams.start[beams.column[first]] <= t.pieceRays;
-    };
-    for (last = first + 1; last < beams.columns() && fits(last + 1);) ++last;
-    const Piece piece = setUp(receivers, light, beams, first, last);
-    const std::vector<float> sums = run(piece, limit);
-    const std::size_t rays = piece.rays.size();
-    for (std::size_t c = 0; c < tree_->channels(); ++c)
-      for (std::size_t k = 0; k < rays; ++k) depths[c * count + piece.receivers[k]] = sums[c * rays + k];
-    if (done) done(rays);
+  Beams beams;
+  std::size_t passed = 0, reported = 0;  // rays: through one part each, through all parts
+  for (std::size_t part = 0; part < parts_.size(); ++part) {
+    if (parts_.size() > 1) release();
+    load(part);
+    if (part == 0)
+      beams = planBeams(receivers, light, reached, tree_->meanRadius, t.beams);
+    else if (std::isfinite(limit))
+      beams = planBeams(receivers, light, stillBright(depths, count, reached, limit), tree_->meanRadius, t.beams);
+    for (std::size_t first = 0, last = 0; first < beams.columns(); first = last) {
+      const auto extentTo = [&](std::size_t end) {
+        return Extent{end - first, beams.column[end] - beams.column[first],
+                      beams.start[beams.column[end]] - beams.start[beams.column[first]]};
+      };
+      const auto fits = [&](const Extent& e) {
+        return e.columns <= t.pieceColumns && e.beams <= t.pieceBeams && e.rays <= t.pieceRays && hasRoom(e);
+      };
+      for (last = first + 1; last < beams.columns() && fits(extentTo(last + 1));) ++last;
+      makeRoom(extentTo(last));
+      const Piece piece = setUp(receivers, light, beams, first, last);
+      const std::vector<float> sums = run(piece, limit);
+      const std::size_t rays = piece.rays.size();
+      for (std::size_t c = 0; c < tree_->channels(); ++c)
+        for (std::size_t k = 0; k < rays; ++k) depths[c * count + piece.receivers[k]] += sums[c * rays + k];
+      passed += rays;
+      const std::size_t whole = passed / parts_.size();
+      if (done) done(whole - std::exchange(reported, whole));
+    }
   }
   return depths;
+}
+
+std::vector<std::uint8_t> LightPass::stillBright(std::span<const float> depths, std::size_t count,
+                                                 std::span<const std::uint8_t> reached, float limit) const {
+  std::vector<std::uint8_t> bright(count);
+  parallelBlocks(count, 1 << 14, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      float least = depths[k];
+      for (std::size_t c = 1; c < tree_->channels(); ++c) least = std::min(least, depths[c * count + k]);
+      bright[k] = (reached.empty() || reached[k] != 0) && !(least > limit) ? 1 : 0;
+    }
+  });
+  return bright;
+}
+
+bool LightPass::hasRoom(const Extent& extent) const {
+  if (extent.within(buffers_.room)) return true;
+  const std::uint64_t held = buffers_.room.rays > 0 ? arraysCost(device_, bufferSizes(buffers_.room)) : 0;
+  return arraysCost(device_, bufferSizes(extent)) + device_.stagingCost() <= device_.budget().room() + held;
+}
+
+void LightPass::makeRoom(const Extent& extent) {
+  const Extent old = buffers_.room;
+  if (extent.within(old)) return;
+  release();
+  // An eighth more where that fits: pieces differ, and so few of them make their buffers anew.
+  const auto more = [](std::size_t had, std::size_t wanted) { return std::max(had, wanted + wanted / 8); };
+  Extent room{more(old.columns, extent.columns), more(old.beams, extent.beams), more(old.rays, extent.rays)};
+  if (!arraysFit(device_, bufferSizes(room), device_.stagingCost())) room = extent;
+  const std::vector<std::uint64_t> sizes = bufferSizes(room);
+  Buffers& to = buffers_;
+  std::size_t k = 0;
+  for (Buffer* buffer : {&to.columns, &to.planes, &to.walks, &to.beams, &to.rays, &to.depths, &to.found, &to.order,
+                         &to.chosen, &to.chosenIndex})
+    *buffer = device_.createBuffer(sizes[k++]);
+  to.room = room;
+}
+
+std::vector<std::uint64_t> LightPass::bufferSizes(const Extent& e) const {
+  const Tuning t = tuning(device_);
+  const std::uint64_t bins = layout::kLightBins * (1 + device_.mostSubgroupSize());
+  return {e.columns * sizeof(layout::LightColumn),
+          8 * e.columns * sizeof(vec4),
+          e.columns * sizeof(layout::LightWalk),
+          e.beams * sizeof(layout::LightBeam),
+          e.rays * sizeof(layout::LightRay),
+          tree_->channels() * e.rays * sizeof(float),
+          e.columns * layout::kFoundLists * t.foundCapacity * sizeof(vec4),
+          e.columns * (layout::kOrderLists * t.foundCapacity + bins) * sizeof(layout::uint),
+          e.beams * layout::kChosenLists * t.chosenCapacity * sizeof(vec4),
+          e.beams * layout::kChosenLists * t.chosenCapacity * sizeof(layout::uint)};
 }
 
 LightPass::Piece LightPass::setUp(const Receivers& receivers, const layout::Light& light, const Beams& beams,
@@ -229,6 +348,7 @@ LightPass::Piece LightPass::setUp(const Receivers& receivers, const layout::Ligh
   Piece piece;
   piece.columns.resize(last - first), piece.planes.resize(8 * (last - first));
   piece.rays.resize(beams.start[beams.column[last]] - firstRay), piece.receivers.resize(piece.rays.size());
+  const Part& part = parts_[loaded_];
   const Bounds bounds = tree_->bounds();
   const dvec3 amid(bounds.centre());
   const double reach = 0.5 * glm::length(dvec3(bounds.size()));
@@ -261,7 +381,7 @@ LightPass::Piece LightPass::setUp(const Receivers& receivers, const layout::Ligh
       to.rayCount = static_cast<layout::uint>(beam.rays.receiver.size());
       to.column = static_cast<layout::uint>(at);
       for (std::size_t k = 0; k < to.rayCount; ++k) {
-        piece.rays[to.firstRay + k] = rayOf(beam.rays, k);
+        piece.rays[to.firstRay + k] = rayOf(beam.rays, k, part.firstSlot, part.endSlot);
         piece.receivers[to.firstRay + k] = beam.rays.receiver[k];
       }
     }
@@ -279,40 +399,27 @@ LightPass::Piece LightPass::setUp(const Receivers& receivers, const layout::Ligh
 
 std::vector<float> LightPass::run(const Piece& piece, float limit) {
   const Tuning t = tuning(device_);
-  const auto grow = [&](Buffer& buffer, std::size_t bytes) {
-    if (buffer.size() < bytes) buffer = device_.createBuffer(bytes + bytes / 8);
-  };
-  const std::size_t columns = piece.columns.size(), beams = piece.plain.size() + piece.careful.size(),
-                    rays = piece.rays.size();
+  const std::size_t columns = piece.columns.size(), rays = piece.rays.size();
   const std::size_t channels = tree_->channels();
-  Buffers& to = buffers_;
-  grow(to.columns, columns * sizeof(layout::LightColumn)), grow(to.planes, 8 * columns * sizeof(vec4));
-  grow(to.walks, columns * sizeof(layout::LightWalk)), grow(to.beams, beams * sizeof(layout::LightBeam));
-  grow(to.rays, rays * sizeof(layout::LightRay)), grow(to.depths, channels * rays * sizeof(float));
-  grow(to.found, columns * layout::kFoundLists * t.foundCapacity * sizeof(vec4));
-  grow(to.order, columns *
-                     (layout::kOrderLists * t.foundCapacity + layout::kLightBins * (1 + device_.mostSubgroupSize())) *
-                     sizeof(layout::uint));
-  grow(to.chosen, beams * layout::kChosenLists * t.chosenCapacity * sizeof(vec4));
-  grow(to.chosenIndex, beams * layout::kChosenLists * t.chosenCapacity * sizeof(layout::uint));
-  deviceBytes_ = std::max(deviceBytes_, nodes_.size() + particles_.size() + peaks_.size() + to.bytes());
+  const Buffers& to = buffers_;
   device_.upload<layout::LightColumn>(to.columns, piece.columns);
   device_.upload<vec4>(to.planes, piece.planes);
   device_.upload<layout::LightRay>(to.rays, piece.rays);
   device_.upload<layout::LightWalk>(to.walks, std::vector<layout::LightWalk>(columns));
   device_.upload<float>(to.depths, std::vector<float>(channels * rays, 0.0f));
 
+  const Part& part = parts_[loaded_];
   layout::LightParams params{};
   params.nodes = nodes_.address(), params.particles = particles_.address(), params.peaks = peaks_.address();
   params.columns = to.columns.address(), params.planes = to.planes.address(), params.walks = to.walks.address();
   params.beams = to.beams.address(), params.rays = to.rays.address(), params.opticalDepths = to.depths.address();
   params.found = to.found.address(), params.order = to.order.address(), params.chosen = to.chosen.address();
   params.chosenIndex = to.chosenIndex.address();
-  params.nodeCount = static_cast<layout::uint>(tree_->nodeCount());
+  params.nodeCount = part.endNode - part.firstNode;
   params.columnCount = static_cast<layout::uint>(columns);
   params.rayCount = static_cast<layout::uint>(rays);
   params.opticalDepthLimit = limit;
-  params.slotCount = static_cast<layout::uint>(tree_->particleCount());
+  params.slotCount = part.endSlot - part.firstSlot;
 
   const ComputePipeline& gathering = gather({piece.perspective, !piece.careful.empty(), piece.exact});
   // A subgroup may be as large as the device likes: enough workgroups for the largest, those beyond the last end.

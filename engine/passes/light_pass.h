@@ -26,13 +26,19 @@ class LightPass {
   /// `device` must outlive the pass.
   LightPass(const Device& device, layout::uint falloff, layout::uint endpoint);
 
-  /// Copies the tree, which must stay alive, to the device: 20 bytes a particle (28 with three channels), 32 bytes a
-  /// node. Throws MachineError where it does not fit.
+  /// Takes the tree, which must stay alive: 20 bytes a particle on the device (28 with three channels), 32 bytes a
+  /// node. Where the device's budget has no room for that beside what opticalDepths needs, the tree is cut into parts
+  /// that are there one at a time. Throws MachineError where not even a leaf fits.
   void setTree(const Octree& tree);
+  /// How many parts the tree has.
+  std::size_t parts() const { return parts_.size(); }
 
   /// As mote::opticalDepths for the tree that was set, with the rules of the constructor; T within 2e-5 of it for
   /// cutoff 0. Needs on the device, beside the tree and however many receivers there are, about 65 MiB on CPU devices
-  /// and 500 MiB on others; on the host 16 bytes a receiver.
+  /// and 500 MiB on others, or what the budget leaves of it, 3 MiB at least; on the host 16 bytes a receiver.
+  /// A tree in parts is passed once a part, which copies it to the device once a light; sums are then in another order,
+  /// so T differs from that of the whole tree by rounding and, as ever, by at most the cutoff: a ray that one part has
+  /// made dark meets no later one.
   std::vector<float> opticalDepths(const Receivers& receivers, const layout::Light& light,
                                    const LightingOptions& options, std::span<const std::uint8_t> reached = {},
                                    const RaysDone& done = {});
@@ -42,8 +48,8 @@ class LightPass {
 
   /// Device seconds of all opticalDepths calls so far, from timestamps.
   double deviceSeconds() const { return deviceSeconds_; }
-  /// Bytes on the device while a light is computed.
-  std::uint64_t deviceBytes() const { return deviceBytes_; }
+  /// Gives back to the device's budget what the last opticalDepths needed beside the tree; the next takes it again.
+  void release() { buffers_ = {}; }
 
  private:
   /// What shaders are compiled for, beside the pass and the tree. `careful`: of any beam (gather), of the beam (sum).
@@ -64,9 +70,18 @@ class LightPass {
     std::vector<std::uint32_t> receivers;  ///< of the rays
     bool perspective, exact, nearLight;
   };
+  /// How much of each there is in a piece, or room for.
+  struct Extent {
+    std::size_t columns = 0, beams = 0, rays = 0;
+    bool within(const Extent& e) const { return columns <= e.columns && beams <= e.beams && rays <= e.rays; }
+  };
   struct Buffers {
     Buffer columns, planes, walks, beams, rays, depths, found, order, chosen, chosenIndex;
-    std::uint64_t bytes() const;
+    Extent room;
+  };
+  /// Nodes [firstNode, endNode) in the order of the walk, which needs no more than that, and their particles.
+  struct Part {
+    std::uint32_t firstNode, endNode, firstSlot, endSlot;
   };
   struct Tuning;
   static Tuning tuning(const Device& device);
@@ -74,6 +89,13 @@ class LightPass {
   std::vector<SpecializationConstant> constants(bool perspective, bool careful) const;
   const ComputePipeline& gather(const GatherVariant& variant);
   const ComputePipeline& sum(const SumVariant& variant);
+  std::vector<std::uint64_t> partSizes(const Part& part) const;
+  std::vector<std::uint64_t> bufferSizes(const Extent& extent) const;  // in the order of Buffers
+  void load(std::size_t part);
+  bool hasRoom(const Extent& extent) const;
+  void makeRoom(const Extent& extent);
+  std::vector<std::uint8_t> stillBright(std::span<const float> depths, std::size_t count,
+                                        std::span<const std::uint8_t> reached, float limit) const;
   Piece setUp(const Receivers& receivers, const layout::Light& light, const Beams& beams, std::size_t first,
               std::size_t last) const;
   std::vector<float> run(const Piece& piece, float limit);
@@ -85,10 +107,11 @@ class LightPass {
   float greatestRadius_ = 0;
   std::map<GatherVariant, ComputePipeline> gathers_;
   std::map<SumVariant, ComputePipeline> sums_;
+  std::vector<Part> parts_;  // of the tree; none for no particles
+  std::size_t loaded_ = 0;   // the one on the device; parts_.size(): none
   Buffer nodes_, particles_, peaks_;
   Buffers buffers_;
   double deviceSeconds_ = 0;
-  std::uint64_t deviceBytes_ = 0;
 };
 
 }  // namespace mote

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "engine/passes/part_size.h"
 #include "host/core/error.h"
 #include "shaders/glsl/layout/solid.h"
 #include "spirv.h"
@@ -42,12 +43,13 @@ std::vector<std::uint8_t> SolidPass::occluded(const Receivers& receivers, std::s
   std::vector<std::uint8_t> result(receivers.size(), 0);
   if (nodeCount_ == 0 || light.castsShadows == 0) return result;
   const std::vector<std::uint32_t> rays = asked(receivers.size(), wanted);
-  const std::size_t most = std::min(kRaysPerSubmit, rays.size());
+  const auto sizes = [](std::uint64_t count) { return std::vector<std::uint64_t>(4, count * sizeof(float)); };
+  const auto most = static_cast<std::size_t>(partThatFits(device_, std::min(kRaysPerSubmit, rays.size()), kLeastPart,
+                                                          sizes, device_.stagingCost(), "shadow rays past solids"));
   const std::array<std::span<const float>, 3> sources{receivers.x, receivers.y, receivers.z};
   std::array<Buffer, 3> origins;
   for (Buffer& buffer : origins) buffer = device_.createBuffer(most * sizeof(float));
   const Buffer flags = device_.createBuffer(most * sizeof(std::uint32_t));
-  deviceBytes_ = nodes_.size() + triangles_.size() + 3 * origins[0].size() + flags.size();
   std::vector<float> gathered(most);
   for (std::size_t begin = 0; begin < rays.size(); begin += most) {
     const std::size_t count = std::min(most, rays.size() - begin);

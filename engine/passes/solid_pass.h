@@ -20,14 +20,13 @@ class SolidPass {
   void setTree(const SolidTree& tree);
 
   /// As mote::occluded for the tree that was set; the same bytes wherever the device divides as exactly as the host
-  /// does (lavapipe), watertight everywhere. 16 bytes a ray on the device for at most 2²⁰ rays at a time.
+  /// does (lavapipe), watertight everywhere. 16 bytes a ray on the device for at most 2²⁰ rays at a time, and as few
+  /// as its budget has room for.
   std::vector<std::uint8_t> occluded(const Receivers& receivers, std::span<const std::uint8_t> wanted,
                                      const layout::Light& light);
 
   /// Device seconds of all occluded() calls so far, from timestamps.
   double deviceSeconds() const { return deviceSeconds_; }
-  /// Bytes on the device while rays are cast.
-  std::uint64_t deviceBytes() const { return deviceBytes_; }
 
  private:
   const Device& device_;
@@ -36,7 +35,6 @@ class SolidPass {
   Buffer nodes_, triangles_;
   layout::uint nodeCount_ = 0;
   double deviceSeconds_ = 0;
-  std::uint64_t deviceBytes_ = 0;
 };
 
 }  // namespace mote

@@ -48,6 +48,16 @@ SplatPass::SplatPass(const Device& device, layout::uint falloff, bool withDepth,
   MOTE_CHECK(pointsPerSubmit, >, 0u);
 }
 
+std::uint64_t SplatPass::downloadCost(std::uint32_t width, std::uint32_t height) const {
+  return device_.bufferCost(std::uint64_t{width} * height * sizeof(vec4), Memory::Host);
+}
+
+std::uint64_t SplatPass::drawingCost(std::uint32_t width, std::uint32_t height) const {
+  requirePictureFits(device_, width, height);
+  return device_.imageCost(width, height, kColorFormat) +
+         (withDepth_ ? device_.imageCost(width, height, kDepthFormat) : 0) + downloadCost(width, height);
+}
+
 SplatTarget SplatPass::createTarget(std::uint32_t width, std::uint32_t height) const {
   requirePictureFits(device_, width, height);
   SplatTarget target;
@@ -80,13 +90,13 @@ std::uint32_t SplatPass::submissions(std::uint32_t count) const {
 
 void SplatPass::draw(const SplatTarget& target, const Buffer& particles, const Buffer& order, std::uint32_t count,
                      const layout::SplatCamera& camera, TimestampQueries* times,
-                     const std::function<void(std::uint32_t)>& progress) const {
+                     const std::function<void(std::uint32_t)>& progress, bool keep) const {
   std::uint32_t first = 0;
-  do {  // at least once: without points the target must still be cleared
+  do {  // at least once: without points the target may have to be cleared
     const std::uint32_t part = std::min(count - first, pointsPerSubmit_);
     device_.run([&](CommandBuffer& commands) {
       const std::uint32_t span = times ? times->begin(commands, "splat") : 0;
-      record(commands, target, particles, order, first, part, camera, first > 0);
+      record(commands, target, particles, order, first, part, camera, keep || first > 0);
       if (times) times->end(commands, span);
     });
     first += part;

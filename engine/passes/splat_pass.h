@@ -21,13 +21,20 @@ struct SplatTarget {
 /// nothing at all on lavapipe. Cost on lavapipe with 2 cores: about 1.2 s for a million splats of 4 pixels' radius.
 class SplatPass {
  public:
-  /// Points of one submission: seconds on a software device, far below the watchdog of a hardware driver.
-  static constexpr std::uint32_t kPointsPerSubmit = 1u << 22;
+  /// Points of one submission: a second on a software device, far below the watchdog of a hardware driver. lavapipe
+  /// keeps all of a submission's quads in memory that is no device's: 0.8 GB more for 4 M at once
+  /// (docs/performance.md).
+  static constexpr std::uint32_t kPointsPerSubmit = 1u << 20;
 
   /// `falloff` kFalloff…; `withDepth` adds the depth layer Z; `pointsPerSubmit` > 0 is what draw() submits at once.
   /// The device must outlive the pass and its targets.
   SplatPass(const Device& device, layout::uint falloff, bool withDepth,
             std::uint32_t pointsPerSubmit = kPointsPerSubmit);
+
+  /// What drawing and downloading pictures of this size [pixels, ≥ 1] take of the device's budget beside the particles.
+  std::uint64_t drawingCost(std::uint32_t width, std::uint32_t height) const;
+  /// … of it what download() takes while the target is there.
+  std::uint64_t downloadCost(std::uint32_t width, std::uint32_t height) const;
 
   /// Throws MachineError with the numbers where the device cannot draw pictures of this size [pixels, ≥ 1].
   SplatTarget createTarget(std::uint32_t width, std::uint32_t height) const;
@@ -42,11 +49,12 @@ class SplatPass {
   /// Submissions that draw() makes for `count` points, ≥ 1: the spans that its timestamps need.
   std::uint32_t submissions(std::uint32_t count) const;
 
-  /// Records and submits all `count` points in parts; returns when the picture is complete. `times`, where given, gets
-  /// one span "splat" a submission; `progress` the number of points drawn so far, after each.
+  /// Records and submits all `count` points in parts; returns when they are drawn, over what the target holds where
+  /// `keep` is set. `times`, where given, gets one span "splat" a submission; `progress` the number of points drawn so
+  /// far, after each.
   void draw(const SplatTarget& target, const Buffer& particles, const Buffer& order, std::uint32_t count,
             const layout::SplatCamera& camera, TimestampQueries* times = nullptr,
-            const std::function<void(std::uint32_t)>& progress = {}) const;
+            const std::function<void(std::uint32_t)>& progress = {}, bool keep = false) const;
 
   /// The target's picture, with depth where the pass has it. Throws MachineError where host-visible memory is short.
   Image download(const SplatTarget& target) const;

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <span>
 
+#include "engine/vulkan/device_memory.h"
 #include "engine/vulkan/handle.h"
 #include "host/core/error.h"
 
@@ -39,7 +40,7 @@ class Buffer {
  private:
   friend class Device;
   // Destroyed from the last to the first: the buffer before the memory it is bound to.
-  DeviceHandle<VkDeviceMemory, &vkFreeMemory> memory_;
+  DeviceMemory memory_;
   DeviceHandle<VkBuffer, &vkDestroyBuffer> buffer_;
   VkDeviceSize size_ = 0;
   VkDeviceAddress address_ = 0;

@@ -58,9 +58,35 @@ VkDevice createLogicalDevice(VkPhysicalDevice physicalDevice, std::uint32_t queu
   return device;
 }
 
+/// What the host can map; coherent, so that no write of either side is ever flushed.
+constexpr VkMemoryPropertyFlags kMappable = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+
+VkBufferCreateInfo bufferInfo(VkDeviceSize bytes) {
+  auto info = structure<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
+  info.size = std::max<VkDeviceSize>(bytes, 16);  // a buffer of 0 bytes does not exist in Vulkan, but an array does
+  info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT |
+               VK_BUFFER_USAGE_INDEX_BUFFER_BIT | VK_BUFFER_USAGE_VERTEX_BUFFER_BIT |
+               VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
+               VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+  return info;
+}
+
+VkImageCreateInfo imageInfo(std::uint32_t width, std::uint32_t height, VkFormat format) {
+  auto info = structure<VkImageCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO);
+  info.imageType = VK_IMAGE_TYPE_2D;
+  info.format = format;
+  info.extent = {width, height, 1};
+  info.mipLevels = info.arrayLayers = 1;
+  info.samples = VK_SAMPLE_COUNT_1_BIT;
+  info.tiling = VK_IMAGE_TILING_OPTIMAL;
+  info.usage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT;
+  info.initialLayout = VK_IMAGE_LAYOUT_UNDEFINED;
+  return info;
+}
+
 }  // namespace
 
-Device::Device(VkPhysicalDevice physicalDevice, bool stageAlways)
+Device::Device(VkPhysicalDevice physicalDevice, bool stageAlways, MemoryLimit limit)
     : physicalDevice_(physicalDevice), stageAlways_(stageAlways) {
   auto buffers =
       structure<VkPhysicalDeviceMaintenance4Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES);
@@ -85,6 +111,8 @@ Device::Device(VkPhysicalDevice physicalDevice, bool stageAlways)
   maxBuffer_ = buffers.maxBufferSize;
   maxAllocation_ = allocations.maxMemoryAllocationSize;
   vkGetPhysicalDeviceMemoryProperties(physicalDevice, &memory_);
+  const auto share = static_cast<std::uint64_t>(limit.share * static_cast<double>(memoryBytes()));
+  budget_.limit_ = std::min(limit.bytes > 0 ? limit.bytes : share, memoryBytes());
 
   const QueueFamily family = graphicsAndCompute(physicalDevice);
   queueFamily_ = family.index;
@@ -131,8 +159,42 @@ std::uint32_t Device::memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags f
   return best;
 }
 
-void Device::allocate(const VkMemoryRequirements& needs, std::uint32_t type, VkMemoryAllocateFlags flags,
-                      const char* what, VkDeviceMemory* memory) const {
+std::uint32_t Device::memoryType(std::uint32_t typeBits, Memory memory) const {
+  return memory == Memory::Host ? memoryType(typeBits, kMappable, VK_MEMORY_PROPERTY_HOST_CACHED_BIT)
+                                : memoryType(typeBits, 0, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
+}
+
+bool Device::inBudget(std::uint32_t type) const {
+  return memory_.memoryHeaps[memory_.memoryTypes[type].heapIndex].flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT;
+}
+
+bool Device::isMapped(std::uint32_t type, Memory memory) const {
+  const bool mappable = (memory_.memoryTypes[type].propertyFlags & kMappable) == kMappable;
+  return memory == Memory::Host || (mappable && !stageAlways_);
+}
+
+std::uint64_t Device::bufferCost(VkDeviceSize bytes, Memory memory) const {
+  const VkBufferCreateInfo info = bufferInfo(bytes);
+  auto asked = structure<VkDeviceBufferMemoryRequirements>(VK_STRUCTURE_TYPE_DEVICE_BUFFER_MEMORY_REQUIREMENTS);
+  asked.pCreateInfo = &info;
+  auto needs = structure<VkMemoryRequirements2>(VK_STRUCTURE_TYPE_MEMORY_REQUIREMENTS_2);
+  vkGetDeviceBufferMemoryRequirements(device_, &asked, &needs);
+  const VkMemoryRequirements& found = needs.memoryRequirements;
+  return inBudget(memoryType(found.memoryTypeBits, memory)) ? found.size : 0;
+}
+
+std::uint64_t Device::imageCost(std::uint32_t width, std::uint32_t height, VkFormat format) const {
+  const VkImageCreateInfo info = imageInfo(width, height, format);
+  auto asked = structure<VkDeviceImageMemoryRequirements>(VK_STRUCTURE_TYPE_DEVICE_IMAGE_MEMORY_REQUIREMENTS);
+  asked.pCreateInfo = &info;
+  auto needs = structure<VkMemoryRequirements2>(VK_STRUCTURE_TYPE_MEMORY_REQUIREMENTS_2);
+  vkGetDeviceImageMemoryRequirements(device_, &asked, &needs);
+  const VkMemoryRequirements& found = needs.memoryRequirements;
+  return inBudget(memoryType(found.memoryTypeBits, Memory::Device)) ? found.size : 0;
+}
+
+DeviceMemory Device::allocate(const VkMemoryRequirements& needs, std::uint32_t type, VkMemoryAllocateFlags flags,
+                              const char* what) const {
   const std::uint32_t heap = memory_.memoryTypes[type].heapIndex;
   const std::uint64_t heapBytes = memory_.memoryHeaps[heap].size;
   const std::string numbers =
@@ -146,8 +208,19 @@ void Device::allocate(const VkMemoryRequirements& needs, std::uint32_t type, VkM
   info.pNext = &flagsInfo;
   info.allocationSize = needs.size;
   info.memoryTypeIndex = type;
-  vkCheck(tooLarge ? VK_ERROR_OUT_OF_DEVICE_MEMORY : vkAllocateMemory(device_, &info, nullptr, memory),
+  if (!tooLarge && inBudget(type) && needs.size > budget_.room())
+    throw MachineError(fmt::format(
+        "{} bytes asked for {}, and {} of the {} that may be held on {} are taken; --device-memory sets that "
+        "limit, heap {} has {} bytes",
+        needs.size, what, budget_.held(), budget_.limit(), name_, heap, heapBytes));
+  DeviceMemory memory;
+  memory.memory_ = DeviceHandle<VkDeviceMemory, &vkFreeMemory>(device_);
+  vkCheck(tooLarge ? VK_ERROR_OUT_OF_DEVICE_MEMORY : vkAllocateMemory(device_, &info, nullptr, memory.memory_.out()),
           "vkAllocateMemory", numbers);
+  if (!inBudget(type)) return memory;
+  memory.budget_ = &budget_, memory.bytes_ = needs.size;
+  budget_.take(needs.size);
+  return memory;
 }
 
 Buffer Device::createBuffer(VkDeviceSize bytes, Memory memory) const {
@@ -155,31 +228,20 @@ Buffer Device::createBuffer(VkDeviceSize bytes, Memory memory) const {
     throw MachineError(fmt::format("a buffer of {} bytes is beyond the maxBufferSize of {}, {} bytes; its heap has {}",
                                    bytes, name_, maxBuffer_, memoryBytes()));
   Buffer buffer;
-  buffer.memory_ = DeviceHandle<VkDeviceMemory, &vkFreeMemory>(device_);
   buffer.buffer_ = DeviceHandle<VkBuffer, &vkDestroyBuffer>(device_);
   buffer.size_ = bytes;
 
-  auto info = structure<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
-  info.size = std::max<VkDeviceSize>(bytes, 16);  // a buffer of 0 bytes does not exist in Vulkan, but an array does
-  info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT |
-               VK_BUFFER_USAGE_INDEX_BUFFER_BIT | VK_BUFFER_USAGE_VERTEX_BUFFER_BIT |
-               VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
-               VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+  const VkBufferCreateInfo info = bufferInfo(bytes);
   vkCheck(vkCreateBuffer(device_, &info, nullptr, buffer.buffer_.out()), "vkCreateBuffer",
           fmt::format("{} bytes", bytes));
   VkMemoryRequirements needs;
   vkGetBufferMemoryRequirements(device_, buffer.handle(), &needs);
 
-  constexpr VkMemoryPropertyFlags kMappable =
-      VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
-  const bool host = memory == Memory::Host;
-  const std::uint32_t type = host ? memoryType(needs.memoryTypeBits, kMappable, VK_MEMORY_PROPERTY_HOST_CACHED_BIT)
-                                  : memoryType(needs.memoryTypeBits, 0, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
-  allocate(needs, type, VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT, "a buffer", buffer.memory_.out());
+  const std::uint32_t type = memoryType(needs.memoryTypeBits, memory);
+  buffer.memory_ = allocate(needs, type, VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT, "a buffer");
   vkCheck(vkBindBufferMemory(device_, buffer.handle(), buffer.memory_.get(), 0), "vkBindBufferMemory");
 
-  const bool mappable = (memory_.memoryTypes[type].propertyFlags & kMappable) == kMappable;
-  if (host || (mappable && !stageAlways_))
+  if (isMapped(type, memory))
     vkCheck(vkMapMemory(device_, buffer.memory_.get(), 0, VK_WHOLE_SIZE, 0, &buffer.data_), "vkMapMemory",
             fmt::format("{} bytes", bytes));
   auto address = structure<VkBufferDeviceAddressInfo>(VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO);
@@ -194,28 +256,18 @@ Image2D Device::createImage(std::uint32_t width, std::uint32_t height, VkFormat 
     throw MachineError(fmt::format("a picture of {} x {} pixels is beyond the maxImageDimension2D of {}, {}", width,
                                    height, name_, limit));
   Image2D image;
-  image.memory_ = DeviceHandle<VkDeviceMemory, &vkFreeMemory>(device_);
   image.image_ = DeviceHandle<VkImage, &vkDestroyImage>(device_);
   image.view_ = DeviceHandle<VkImageView, &vkDestroyImageView>(device_);
   image.format_ = format;
   image.width_ = width;
   image.height_ = height;
 
-  auto info = structure<VkImageCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO);
-  info.imageType = VK_IMAGE_TYPE_2D;
-  info.format = format;
-  info.extent = {width, height, 1};
-  info.mipLevels = info.arrayLayers = 1;
-  info.samples = VK_SAMPLE_COUNT_1_BIT;
-  info.tiling = VK_IMAGE_TILING_OPTIMAL;
-  info.usage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT;
-  info.initialLayout = VK_IMAGE_LAYOUT_UNDEFINED;
+  const VkImageCreateInfo info = imageInfo(width, height, format);
   const std::string what = fmt::format("a picture of {} x {} pixels", width, height);
   vkCheck(vkCreateImage(device_, &info, nullptr, image.image_.out()), "vkCreateImage", what);
   VkMemoryRequirements needs;
   vkGetImageMemoryRequirements(device_, image.handle(), &needs);
-  allocate(needs, memoryType(needs.memoryTypeBits, 0, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT), 0, what.c_str(),
-           image.memory_.out());
+  image.memory_ = allocate(needs, memoryType(needs.memoryTypeBits, Memory::Device), 0, what.c_str());
   vkCheck(vkBindImageMemory(device_, image.handle(), image.memory_.get(), 0), "vkBindImageMemory", what);
 
   auto view = structure<VkImageViewCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO);

@@ -22,8 +22,9 @@ namespace mote {
 class Device {
  public:
   /// A device from chooseDevice, which has checked that nothing is missing. `stageAlways` keeps Memory::Device buffers
-  /// unmapped even where they could be mapped: it makes a CPU device behave as a discrete one does.
-  explicit Device(VkPhysicalDevice physicalDevice, bool stageAlways = false);
+  /// unmapped even where they could be mapped: it makes a CPU device behave as a discrete one does. `limit`, at most
+  /// the heap, is what buffers and pictures in device-local memory may take together.
+  explicit Device(VkPhysicalDevice physicalDevice, bool stageAlways = false, MemoryLimit limit = {});
   ~Device();
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
@@ -44,7 +45,17 @@ class Device {
   /// Size of the device-local heap [bytes].
   std::uint64_t memoryBytes() const;
 
-  /// Throws MachineError with the bytes asked for and the heap's size. 0 bytes is a valid buffer.
+  /// Everything made here that lies in device-local memory, to the byte that the driver takes.
+  const MemoryBudget& budget() const { return budget_; }
+  /// Lets the budget's peak begin anew, at what is held now.
+  void restartPeak() const { budget_.peak_ = budget_.held_; }
+  /// What a buffer or picture would take of the budget: 0 where it would lie in the host's memory.
+  std::uint64_t bufferCost(VkDeviceSize bytes, Memory memory = Memory::Device) const;
+  std::uint64_t imageCost(std::uint32_t width, std::uint32_t height, VkFormat format) const;
+  /// What copies to and from buffers that are not mapped must find left of the budget; 0 where they need nothing of it.
+  std::uint64_t stagingCost() const;
+
+  /// Throws MachineError with the bytes asked for, the budget and the heap's size. 0 bytes is a valid buffer.
   Buffer createBuffer(VkDeviceSize bytes, Memory memory = Memory::Device) const;
   /// Throws MachineError when larger than maxImageDimension2D or memory is short.
   Image2D createImage(std::uint32_t width, std::uint32_t height, VkFormat format) const;
@@ -61,7 +72,8 @@ class Device {
   /// Records with `record` and does both.
   void run(const std::function<void(CommandBuffer&)>& record) const;
 
-  /// Copies bytes into the buffer: at once where it is mapped, else through a staging buffer of at most 64 MiB.
+  /// Copies bytes into the buffer: at once where it is mapped, else through a staging buffer of at most 64 MiB and what
+  /// the budget has left.
   void uploadBytes(const Buffer& to, VkDeviceSize offset, const void* data, std::size_t bytes) const;
   void downloadBytes(const Buffer& from, VkDeviceSize offset, void* data, std::size_t bytes) const;
   template <class T>
@@ -85,8 +97,12 @@ class Device {
  private:
   /// Index of the memory type that has `flags`, is allowed by `typeBits` and has most of `preferred`.
   std::uint32_t memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags flags, VkMemoryPropertyFlags preferred) const;
-  void allocate(const VkMemoryRequirements& needs, std::uint32_t type, VkMemoryAllocateFlags flags, const char* what,
-                VkDeviceMemory* memory) const;
+  std::uint32_t memoryType(std::uint32_t typeBits, Memory memory) const;
+  bool inBudget(std::uint32_t type) const;
+  bool isMapped(std::uint32_t type, Memory memory) const;
+  Buffer stagingBuffer(std::uint64_t bytes) const;
+  DeviceMemory allocate(const VkMemoryRequirements& needs, std::uint32_t type, VkMemoryAllocateFlags flags,
+                        const char* what) const;
   void createLayout(VkShaderStageFlags stages, std::uint32_t pushConstantBytes, VkPipelineLayout* layout) const;
 
   VkPhysicalDevice physicalDevice_;
@@ -97,6 +113,7 @@ class Device {
   VkPhysicalDeviceLimits limits_{};
   VkPhysicalDeviceMemoryProperties memory_{};
   std::uint64_t maxAllocation_ = 0, maxBuffer_ = 0;
+  mutable MemoryBudget budget_;
   std::uint32_t queueFamily_ = 0, timestampBits_ = 0;
   VkDevice device_ = VK_NULL_HANDLE;
   VkQueue queue_ = VK_NULL_HANDLE;

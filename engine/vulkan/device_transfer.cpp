@@ -10,7 +10,8 @@
 namespace mote {
 namespace {
 
-constexpr std::uint64_t kStagingBytes = 64u << 20;  // enough to hide a submission's cost, small beside any heap
+constexpr std::uint64_t kStagingBytes = 64u << 20;       // enough to hide a submission's cost, small beside any heap
+constexpr std::uint64_t kLeastStagingBytes = 64u << 10;  // where the budget has no more
 
 }  // namespace
 
@@ -39,6 +40,18 @@ void Device::run(const std::function<void(CommandBuffer&)>& record) const {
   submitAndWait(std::move(commands));
 }
 
+std::uint64_t Device::stagingCost() const {
+  const std::uint32_t type = memoryType(~0u, Memory::Device);
+  return isMapped(type, Memory::Device) ? 0 : bufferCost(kLeastStagingBytes, Memory::Host);
+}
+
+Buffer Device::stagingBuffer(std::uint64_t bytes) const {
+  std::uint64_t part = std::min(bytes, kStagingBytes);
+  while (part > kLeastStagingBytes && bufferCost(part, Memory::Host) > budget_.room())
+    part = std::max(part / 2, kLeastStagingBytes);
+  return createBuffer(part, Memory::Host);
+}
+
 void Device::uploadBytes(const Buffer& to, VkDeviceSize offset, const void* data, std::size_t bytes) const {
   MOTE_CHECK(offset + bytes, <=, to.size());
   if (bytes == 0) return;
@@ -46,9 +59,9 @@ void Device::uploadBytes(const Buffer& to, VkDeviceSize offset, const void* data
     std::memcpy(to.map<std::byte>().data() + offset, data, bytes);
     return;
   }
-  const Buffer staging = createBuffer(std::min<std::uint64_t>(bytes, kStagingBytes), Memory::Host);
-  for (std::uint64_t done = 0; done < bytes; done += kStagingBytes) {
-    const std::uint64_t part = std::min<std::uint64_t>(bytes - done, kStagingBytes);
+  const Buffer staging = stagingBuffer(bytes);
+  for (std::uint64_t done = 0; done < bytes; done += staging.size()) {
+    const std::uint64_t part = std::min<std::uint64_t>(bytes - done, staging.size());
     std::memcpy(staging.map<std::byte>().data(), static_cast<const std::byte*>(data) + done, part);
     run([&](CommandBuffer& commands) { commands.copy(staging, 0, to, offset + done, part); });
   }
@@ -61,9 +74,9 @@ void Device::downloadBytes(const Buffer& from, VkDeviceSize offset, void* data, 
     std::memcpy(data, from.map<std::byte>().data() + offset, bytes);
     return;
   }
-  const Buffer staging = createBuffer(std::min<std::uint64_t>(bytes, kStagingBytes), Memory::Host);
-  for (std::uint64_t done = 0; done < bytes; done += kStagingBytes) {
-    const std::uint64_t part = std::min<std::uint64_t>(bytes - done, kStagingBytes);
+  const Buffer staging = stagingBuffer(bytes);
+  for (std::uint64_t done = 0; done < bytes; done += staging.size()) {
+    const std::uint64_t part = std::min<std::uint64_t>(bytes - done, staging.size());
     run([&](CommandBuffer& commands) { commands.copy(from, offset + done, staging, 0, part); });
     std::memcpy(static_cast<std::byte*>(data) + done, staging.map<std::byte>().data(), part);
   }

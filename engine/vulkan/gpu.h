@@ -14,6 +14,7 @@ struct DeviceOptions {
   std::string device = {};   // number or part of the name; empty: the best
   bool validate = false;     // validation and synchronization layers
   bool stageAlways = false;  // see Device
+  MemoryLimit memory = {};
 };
 
 /// Move-only; whatever its device made must be destroyed before it.

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "engine/vulkan/device_memory.h"
 #include "engine/vulkan/handle.h"
 
 namespace mote {
@@ -21,7 +22,7 @@ class Image2D {
 
  private:
   friend class Device;
-  DeviceHandle<VkDeviceMemory, &vkFreeMemory> memory_;
+  DeviceMemory memory_;
   DeviceHandle<VkImage, &vkDestroyImage> image_;
   DeviceHandle<VkImageView, &vkDestroyImageView> view_;
   VkFormat format_ = VK_FORMAT_UNDEFINED;
