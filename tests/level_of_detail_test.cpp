@@ -314,10 +314,13 @@ TEST(LevelOfDetail, AnyReceiversAndOnlyThoseReached) {
 }
 
 TEST(LevelOfDetail, ARayThatStopsAtTheCutoffIsDarkWithoutItsOwnParticleToo) {
-  // Peaks of 5: taken off a sum that stopped at −ln(cutoff) = 2.3 they would leave the ray in the light.
+  // Pairs with peaks of 4 in two layers. A ray from below begins with 4, beyond −ln(cutoff) = 2.3; without its own
+  // particle that is 2, a T of 0.14, where the layer above would have left it in the dark.
   std::vector<vec3> position;
-  for (std::size_t i = 0; i < 4000; ++i) position.emplace_back(vec3(Random(6, i / 2).direction()));
-  const Octree tree = buildOctree(position, std::vector<float>(4000, 0.3f), std::vector<float>(4000, 5.0f));
+  for (std::size_t i = 0; i < 4000; ++i)
+    position.emplace_back(0.1f * static_cast<float>(i / 2 % 40), i < 2000 ? 0 : 1,
+                          0.1f * static_cast<float>(i / 80 % 25));
+  const Octree tree = buildOctree(position, std::vector<float>(4000, 0.02f), std::vector<float>(4000, 4.0f));
   const DetailTree detail = detailOf(tree, {1e-5, 1});
   ASSERT_EQ(detail.standIns(), 2000u);
   const LightingOptions options{.cutoff = 0.1f};
