@@ -3,6 +3,7 @@
 
 #include "engine/passes/light_pass.h"
 #include "host/core/random.h"
+#include "host/lighting/level_of_detail.h"
 #include "host/lighting/medium.h"
 #include "tests/gpu/gpu_fixture.h"
 #include "tests/support/lights.h"
@@ -166,6 +167,31 @@ TEST_F(LightPassTest, LightsAnyPointsInThreeColoursAndOnlyThoseReached) {
       }
     }
   std::printf("worst |dT| of any receivers, grey and RGB: %.2e\n", worst);
+  EXPECT_LE(worst, 2e-5);
+}
+
+TEST_F(LightPassTest, AgreesWithTheHostInLevelOfDetail) {
+  const vec3 inside(0.2f, 0.1f, -0.3f);
+  double worst = 0;
+  for (const bool colours : {false, true})
+    for (const layout::uint endpoint : kEndpoints) {
+      Octree tree = ballTree(20000, 0.2, 0.3, 2, layout::kFalloffSmooth, inside);
+      if (colours) colour(tree);
+      const DetailTree detail(tree, nodeSums(tree), {.tolerance = 0.05});
+      ASSERT_LE(detail.tree().particleCount(), tree.particleCount() / 2);
+      LightPass pass(device(), layout::kFalloffSmooth, endpoint);
+      pass.setTree(detail.tree());
+      const auto onDevice = [&](const Octree&, const auto&... rest) { return pass.opticalDepths(rest...); };
+      const LightingOptions options{.endpoint = endpoint, .cutoff = 0};
+      for (const layout::Light& light : {pointLight(inside), pointLight({2, 3, 1}), directionalLight({0, -1, -0.3f})}) {
+        const std::vector<float> host = lodOpticalDepths(detail, slotsOf(tree), light, options),
+                                 found = lodOpticalDepths(detail, slotsOf(tree), light, options, onDevice);
+        ASSERT_EQ(found.size(), host.size());
+        for (std::size_t i = 0; i < host.size(); ++i)
+          worst = std::max(worst, std::abs(std::exp(-double(host[i])) - std::exp(-double(found[i]))));
+      }
+    }
+  std::printf("worst |dT| in level of detail: %.2e\n", worst);
   EXPECT_LE(worst, 2e-5);
 }
 
