@@ -7,12 +7,13 @@
 #include <vector>
 
 #include "host/core/parallel.h"
+#include "host/core/raw_vector.h"
 
 namespace mote {
 
 template <class Item>
 struct Binned {
-  std::vector<Item> items;           ///< bin after bin
+  RawVector<Item> items;             ///< bin after bin
   std::vector<std::uint32_t> start;  ///< of each bin in `items`, and the end
 
   std::size_t bins() const { return start.empty() ? 0 : start.size() - 1; }

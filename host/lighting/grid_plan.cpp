@@ -12,8 +12,8 @@ constexpr double kRowTiles = 1 << 24, kFaceTiles = kRowTiles * kRowTiles;
 
 /// Keys and flags of all points.
 struct Located {
-  std::vector<double> key;
-  std::vector<std::uint8_t> flags;
+  RawVector<double> key;
+  RawVector<std::uint8_t> flags;
 
   Located(std::span<const float> x, std::span<const float> y, std::span<const float> z, const float* radius,
           const GridShape& shape)
@@ -27,7 +27,7 @@ struct Located {
 
 /// Calls one(key) for each run of receivers of one tile that are reached.
 template <class One>
-void eachReached(const std::vector<double>& keyOf, std::span<const std::uint8_t> reached, std::size_t begin,
+void eachReached(const RawVector<double>& keyOf, std::span<const std::uint8_t> reached, std::size_t begin,
                  std::size_t end, const One& one) {
   double last = kNoTile;
   for (std::size_t k = begin; k < end; ++k)
@@ -35,7 +35,7 @@ void eachReached(const std::vector<double>& keyOf, std::span<const std::uint8_t>
 }
 
 /// Keys of the tiles that have receivers, ascending.
-std::vector<double> tilesWithReceivers(const std::vector<double>& keyOf, std::span<const std::uint8_t> reached) {
+std::vector<double> tilesWithReceivers(const RawVector<double>& keyOf, std::span<const std::uint8_t> reached) {
   constexpr std::size_t kGrain = 1 << 16;
   std::vector<std::vector<double>> parts((keyOf.size() + kGrain - 1) / kGrain);
   const auto ascendingOnce = [](std::vector<double>& keys) {

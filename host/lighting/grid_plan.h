@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "host/core/raw_vector.h"
 #include "host/lighting/column.h"
 #include "host/lighting/light_grid.h"
 
@@ -53,7 +54,7 @@ struct GridPlan {
     std::size_t begin, middle, end;
   };
   std::vector<Tile> tiles;
-  std::vector<std::uint32_t> items;  ///< numbers of receivers, slots; ascending in either part
+  RawVector<std::uint32_t> items;  ///< numbers of receivers, slots; ascending in either part
   bool receiversAreSlots = false;
   /// Slots nearer to a point light than kNearLightRadii / 2 radii, ascending; they are in no grid.
   std::vector<std::uint32_t> nearLight;

@@ -7,6 +7,8 @@ namespace {
 
 /// Groups between the first and the last of a tile's, and bytes of its nodes: what is deeper gets longer bins.
 constexpr int kMostGroupRange = 1 << 18;
+/// So few are kept without asking which are needed.
+constexpr int kAlwaysGroups = 64;
 constexpr std::size_t kMostTileBytes = std::size_t{64} << 20;
 
 template <class T>
@@ -31,9 +33,13 @@ bool markGroups(GridTile& tile) {
     for (int group = (first >> 2) - tile.firstGroup; group <= std::min((end >> 2) - tile.firstGroup, last); ++group)
       tile.groupAt[static_cast<std::size_t>(group)] = 0;
   };
-  for (std::size_t k = 0; k < tile.receivers; ++k) mark(receivers.bin[k], receivers.bin[k]);
-  for (std::size_t i = 0; i < p.points.count; ++i)
-    if (p.half[i] > 0) mark(p.firstBin[i], p.lastBin[i]);
+  if (last < kAlwaysGroups) {
+    std::fill(tile.groupAt.begin(), tile.groupAt.end(), 0);
+  } else {
+    for (std::size_t k = 0; k < tile.receivers; ++k) mark(receivers.bin[k], receivers.bin[k]);
+    for (std::size_t i = 0; i < p.points.count; ++i)
+      if (p.half[i] > 0) mark(p.firstBin[i], p.lastBin[i]);
+  }
   int groups = 1;
   for (std::int32_t& at : tile.groupAt)
     if (at == 0) at = kGroupBins * groups++;

@@ -34,7 +34,7 @@ struct CodedParticle {
   }
 };
 
-std::vector<CodedParticle> codedOrder(std::span<const vec3> position) {
+RawVector<CodedParticle> codedOrder(std::span<const vec3> position) {
   Bounds bounds;
   std::vector<Bounds> parts((position.size() + kGrain - 1) / kGrain);
   parallelBlocks(position.size(), kGrain, [&](std::size_t begin, std::size_t end) {
@@ -67,7 +67,7 @@ std::vector<CodedParticle> codedOrder(std::span<const vec3> position) {
   return std::move(buckets.items);
 }
 
-void gatherSlots(Octree& tree, const std::vector<CodedParticle>& order, const OctreeInput& input) {
+void gatherSlots(Octree& tree, const RawVector<CodedParticle>& order, const OctreeInput& input) {
   const std::size_t count = order.size(), padded = count + kSlotPadding;
   tree.source.resize(count);
   for (auto* array : {&tree.x, &tree.y, &tree.z}) array->resize(padded, kFarAway);
@@ -113,7 +113,7 @@ float above(float value) { return std::nextafter(value, std::numeric_limits<floa
 /// Builds the nodes over a sorted range, depth first.
 class TreeBuilder {
  public:
-  TreeBuilder(const Octree& tree, const std::vector<CodedParticle>& order, std::uint32_t particlesPerCell)
+  TreeBuilder(const Octree& tree, const RawVector<CodedParticle>& order, std::uint32_t particlesPerCell)
       : tree_(tree), order_(order), cellSize_(particlesPerCell) {}
 
   /// Appends the subtree over slots [begin, end), begin < end, to `out`; skip links count from the start of `out`.
@@ -197,14 +197,14 @@ class TreeBuilder {
   }
 
   const Octree& tree_;
-  const std::vector<CodedParticle>& order_;
+  const RawVector<CodedParticle>& order_;
   std::size_t cellSize_;
 };
 
 }  // namespace
 
 std::vector<std::uint32_t> mortonOrder(std::span<const vec3> position) {
-  const std::vector<CodedParticle> coded = codedOrder(position);
+  const RawVector<CodedParticle> coded = codedOrder(position);
   std::vector<std::uint32_t> order(coded.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = coded[i].index;
   return order;
@@ -229,7 +229,7 @@ Octree buildOctree(const OctreeInput& input, std::uint32_t particlesPerCell) {
     throw InputError(
         fmt::format("{} particles: Mote numbers particles with 32 bits, so at most 4294967294", position.size()));
   Octree tree;
-  const std::vector<CodedParticle> order = codedOrder(position);
+  const RawVector<CodedParticle> order = codedOrder(position);
   gatherSlots(tree, order, input);
   tree.leastRadius = leastPositive(tree.radius);
   tree.meanRadius = meanOf(tree.radius, order.size());
