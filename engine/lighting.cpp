@@ -37,17 +37,20 @@ void leaveOut(const std::vector<std::uint8_t>& blocked, std::vector<std::uint8_t
 
 }  // namespace
 
+OpticalDepthSource depthsWithin(const Frame& frame, const DepthSources& sources, std::vector<LightMethod>* methods) {
+  return [&frame, &sources, methods](const Receivers& receivers, const layout::Light& light,
+                                     std::span<const std::uint8_t> reached, const RaysDone& done) {
+    LightMethod method{frame.lightNames[static_cast<std::size_t>(&light - frame.lights.data())], {}};
+    std::vector<float> depths = approximateOpticalDepths(frame.density.tree(), receivers, light, frame.rules,
+                                                         frame.error, method.how, reached, done, sources);
+    if (methods) methods->push_back(std::move(method));
+    return depths;
+  };
+}
+
 ShadowSources hostShadows(const Frame& frame, std::vector<LightMethod>* methods) {
   return {
-      .opticalDepths =
-          [&frame, methods](const Receivers& receivers, const layout::Light& light,
-                            std::span<const std::uint8_t> reached, const RaysDone& done) {
-            LightMethod method{frame.lightNames[static_cast<std::size_t>(&light - frame.lights.data())], {}};
-            std::vector<float> depths = approximateOpticalDepths(frame.density.tree(), receivers, light, frame.rules,
-                                                                 frame.error, method.how, reached, done);
-            if (methods) methods->push_back(std::move(method));
-            return depths;
-          },
+      .opticalDepths = depthsWithin(frame, hostDepths(), methods),
       .occluded = [&frame](const Receivers& receivers, std::span<const std::uint8_t> wanted,
                            const layout::Light& light) { return occluded(frame.solidTree, receivers, wanted, light); }};
 }

@@ -19,7 +19,10 @@ struct ShadowSources {
   OpticalDepthSource opticalDepths;
   OcclusionSource occluded;
 };
-/// On the host, within the frame's error. How each light was computed is added to `methods` where it is given.
+/// From `depths`, within the frame's error. How each light of the particles was computed is added to `methods` where it
+/// is given. `frame` and `depths` must outlive them.
+OpticalDepthSource depthsWithin(const Frame& frame, const DepthSources& depths, std::vector<LightMethod>* methods);
+/// On the host.
 ShadowSources hostShadows(const Frame& frame, std::vector<LightMethod>* methods = nullptr);
 
 /// T · S of one light at any receivers, [channel][receiver] (one channel or three): the medium's transmittance times

@@ -63,30 +63,48 @@ LightWanted lightWanted(const Scene& scene) { return {.byLight = scene.output.li
 namespace {
 
 /// The device's passes behind ShadowSources.
-struct DeviceShadows {
-  LightPass light;
-  SolidPass solids;
-
-  DeviceShadows(const Device& device, const Frame& frame)
-      : light(device, frame.rules.falloff, frame.rules.endpoint), solids(device) {
-    if (!frame.solidTree.empty()) solids.setTree(frame.solidTree);
-    light.setTree(frame.density.tree());  // into what is left
+class DeviceShadows {
+ public:
+  DeviceShadows(const Device& device, const Frame& frame, std::vector<LightMethod>* methods)
+      : frame_(frame), methods_(methods), light_(device, frame.rules.falloff, frame.rules.endpoint), solids_(device) {
+    if (!frame.solidTree.empty()) solids_.setTree(frame.solidTree);
+    depths_.exact = [this](const Octree& tree, const Receivers& receivers, const layout::Light& light,
+                           const LightingOptions& options, std::span<const std::uint8_t> reached,
+                           const RaysDone& done) { return sums(tree, receivers, light, options, reached, done); };
+    depths_.grid = gridOpticalDepths;
   }
+  DeviceShadows(const DeviceShadows&) = delete;
+  DeviceShadows& operator=(const DeviceShadows&) = delete;
 
-  ShadowSources sources(const Frame& frame) {
-    return {.opticalDepths =
-                [&](const Receivers& receivers, const layout::Light& from, std::span<const std::uint8_t> reached,
-                    const RaysDone& done) { return light.opticalDepths(receivers, from, frame.rules, reached, done); },
-            .occluded =
-                [&](const Receivers& receivers, std::span<const std::uint8_t> wanted, const layout::Light& from) {
-                  light.release();
-                  return solids.occluded(receivers, wanted, from);
-                }};
+  ShadowSources sources() {
+    return {.opticalDepths = depthsWithin(frame_, depths_, methods_),
+            .occluded = [this](const Receivers& receivers, std::span<const std::uint8_t> wanted,
+                               const layout::Light& from) {
+              light_.release();
+              return solids_.occluded(receivers, wanted, from);
+            }};
   }
 
   void addTo(FrameStats& stats) const {
-    stats.deviceSeconds["lighting"] += light.deviceSeconds() + solids.deviceSeconds();
+    stats.deviceSeconds["lighting"] += light_.deviceSeconds() + solids_.deviceSeconds();
   }
+
+ private:
+  /// The frame's tree stays on the device from light to light; others are gone when the call is over.
+  std::vector<float> sums(const Octree& tree, const Receivers& receivers, const layout::Light& light,
+                          const LightingOptions& options, std::span<const std::uint8_t> reached, const RaysDone& done) {
+    const bool lasts = &tree == &frame_.density.tree();
+    if (!lasts || !holdsFrame_) light_.setTree(tree);  // into what is left
+    holdsFrame_ = lasts;
+    return light_.opticalDepths(receivers, light, options, reached, done);
+  }
+
+  const Frame& frame_;
+  std::vector<LightMethod>* methods_;
+  LightPass light_;
+  SolidPass solids_;
+  DepthSources depths_;
+  bool holdsFrame_ = false;
 };
 
 /// Adds the most device memory that was held while it lived to the statistics.
@@ -111,13 +129,14 @@ class DevicePeak {
 LitParticles Renderer::light(const Frame& frame, LightWanted wanted, FrameStats& stats) {
   Timer timer;
   const DevicePeak peak(gpu_, stats);
+  std::vector<LightMethod>* methods = frame.error.mean > 0 ? &stats.methods : nullptr;
   LitParticles lit;
   if (backends_.gpuLighting) {
-    DeviceShadows device(gpu_->device(), frame);
-    lit = lightParticles(frame, device.sources(frame), wanted);
+    DeviceShadows device(gpu_->device(), frame, methods);
+    lit = lightParticles(frame, device.sources(), wanted);
     device.addTo(stats);
   } else {
-    lit = lightParticles(frame, hostShadows(frame, frame.error.mean > 0 ? &stats.methods : nullptr), wanted);
+    lit = lightParticles(frame, hostShadows(frame, methods), wanted);
   }
   stats.seconds["lighting"] += timer.lap();
   return lit;
@@ -135,8 +154,8 @@ Image Renderer::draw(const Frame& frame, const Scene& scene, LitParticles lit, F
   std::vector<SurfaceLight> surfaceLights;
   if (!surfaces.empty()) {
     std::optional<DeviceShadows> device;  // gone before the splats need the memory
-    if (backends_.gpuLighting) device.emplace(gpu_->device(), frame);
-    const ShadowSources sources = device ? device->sources(frame) : hostShadows(frame);
+    if (backends_.gpuLighting) device.emplace(gpu_->device(), frame, nullptr);
+    const ShadowSources sources = device ? device->sources() : hostShadows(frame);
     for (const layout::Light& light : frame.lights)
       surfaceLights.push_back(lightSurfaces(frame, scene, surfaces, light, sources));
     if (device) device->addTo(stats);

@@ -10,19 +10,32 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+const char* nameOf(DepthMethod method) {
+  switch (method) {
+    case DepthMethod::Grid: return "light_grid";
+    case DepthMethod::Detail: return "level_of_detail";
+    case DepthMethod::Exact: break;
+  }
+  return "exact";
+}
+
 Json toJson(const LightMethod& method) {
   const Approximation& how = method.how;
-  Json json = {{"light", method.light}, {"method", how.grid ? "light_grid" : "exact"}, {"allowed", how.allowed}};
-  if (how.grid) {
+  Json json = {{"light", method.light}, {"method", nameOf(how.method)}, {"allowed", how.allowed}};
+  if (how.method == DepthMethod::Grid) {
     json["cell"] = how.resolution.cell;
     json["bin"] = how.resolution.bin;
     json["cell_radii"] = how.cellRadii;
   }
-  json["mean"] = how.mean;
-  json["upper"] = how.upper;
-  json["p99"] = how.p99;
-  json["max"] = how.greatest;
-  json["probes"] = how.probes;
+  if (how.method == DepthMethod::Detail) {
+    json["tolerance"] = how.tolerance;
+    json["tree_particles"] = how.treeParticles;
+  }
+  json["mean"] = how.error.mean;
+  json["upper"] = how.error.upper;
+  json["p99"] = how.error.p99;
+  json["max"] = how.error.greatest;
+  json["probes"] = how.error.probes;
   return json;
 }
 

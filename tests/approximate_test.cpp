@@ -61,6 +61,10 @@ Cloud smoke1() {
   return cloudOf(loadParticles({source}, 1, DensityMode::CrossSection, nullptr), 1.5);
 }
 
+const char* nameOf(DepthMethod method) {
+  return method == DepthMethod::Grid ? "grid" : method == DepthMethod::Detail ? "detail" : "exact";
+}
+
 double meanDifference(const std::vector<float>& a, const std::vector<float>& b) {
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(double(a[i]) - double(b[i]));
@@ -80,19 +84,19 @@ int holdThePromise(const char* name, const Cloud& cloud, double opticalDepth,
           transmittances(approximateOpticalDepths(tree, slotsOf(tree), light, {}, {error}, how), light);
       const double mean = meanDifference(exact, found);
       EXPECT_LE(mean, error) << name << " light " << light.type;
-      EXPECT_LE(how.upper, error);
-      grids += how.grid;
+      EXPECT_LE(how.error.upper, error);
+      grids += how.method != DepthMethod::Exact;
       std::printf("%-14s %-11s %.3f: %-5s cell %.2f r, %d tries, mean %.5f (measured %.5f, upper %.5f)\n", name,
-                  light.type == layout::kLightPoint ? "point" : "directional", error, how.grid ? "grid" : "exact",
-                  how.cellRadii, how.tries, mean, how.mean, how.upper);
-      if (!how.grid) {
+                  light.type == layout::kLightPoint ? "point" : "directional", error, nameOf(how.method), how.cellRadii,
+                  how.tries, mean, how.error.mean, how.error.upper);
+      if (how.method == DepthMethod::Exact) {
         EXPECT_EQ(mean, 0);
         continue;
       }
       // 2,048 probes tell the mean to a few percent: 4.5 standard errors, as upper is 2.3 of them above.
-      EXPECT_NEAR(mean, how.mean, 2 * (how.upper - how.mean) + 1e-7);
-      EXPECT_EQ(how.probes, kErrorProbes);
-      EXPECT_GE(how.greatest, how.p99);
+      EXPECT_NEAR(mean, how.error.mean, 2 * (how.error.upper - how.error.mean) + 1e-7);
+      EXPECT_EQ(how.error.probes, kErrorProbes);
+      EXPECT_GE(how.error.greatest, how.error.p99);
     }
   }
   return grids;
@@ -133,6 +137,41 @@ TEST(Approximate, KeepsTheErrorOnRealSmoke) {
   EXPECT_GE(holdThePromise("smoke1", smoke1(), 4, {pointLight({2, 3, 1}), directionalLight({1, -1, 0})}), 4);
 }
 
+TEST(Approximate, LevelOfDetailServesWhereVeryManyOverlap) {
+  const Octree tree = noiseCloud(150000, 10).tree(4);
+  const layout::Light light = pointLight({2, 3, 1});
+  const std::vector<float> exact = transmittances(opticalDepths(tree, light, {}), light);
+  Approximation how;
+  const std::vector<float> found =
+      transmittances(approximateOpticalDepths(tree, slotsOf(tree), light, {}, {0.0007}, how), light);
+  EXPECT_EQ(how.method, DepthMethod::Detail);
+  EXPECT_GT(how.tolerance, 0);
+  EXPECT_LT(how.treeParticles, tree.particleCount());
+  EXPECT_LE(meanDifference(exact, found), 0.0007);
+  EXPECT_GT(how.error.mean, 0);
+}
+
+TEST(Approximate, TakesEverythingFromTheSourcesThatAreGiven) {
+  const Octree tree = noiseCloud(100000, 1.5).tree(4), wide = noiseCloud(150000, 10).tree(4);
+  const layout::Light light = pointLight({2, 3, 1});
+  int exact = 0, grid = 0;
+  DepthSources counted = hostDepths();
+  counted.exact = [&](auto&&... of) { return ++exact, hostDepths().exact(of...); };
+  counted.grid = [&](auto&&... of) { return ++grid, hostDepths().grid(of...); };
+  const auto depths = [&](const Octree& of, double error) {
+    Approximation how;
+    return approximateOpticalDepths(of, slotsOf(of), light, {}, {error}, how, {}, {}, counted);
+  };
+  exact = grid = 0, depths(tree, 0);
+  EXPECT_EQ(exact, 1);
+  EXPECT_EQ(grid, 0);
+  exact = grid = 0, depths(tree, 0.02);
+  EXPECT_EQ(exact, 0);
+  EXPECT_GE(grid, 1);
+  exact = grid = 0, depths(wide, 0.0007);  // level of detail: exact sums of stand-ins
+  EXPECT_GE(exact, 1);
+}
+
 TEST(Approximate, ThreeColoursAndSpotsAndEveryFalloff) {
   const Cloud cloud = noiseCloud(200000, 2);  // for fewer, exact sums are cheaper than the probes
   layout::Light spot = pointLight({0, 4, 0});
@@ -155,7 +194,7 @@ TEST(Approximate, ThreeColoursAndSpotsAndEveryFalloff) {
     const std::vector<float> found = transmittances(
         approximateOpticalDepths(tree, slotsOf(tree), spot, options, {0.02}, how, reached), count, spot, vec3(1));
     ASSERT_EQ(found.size(), 3 * count);
-    EXPECT_TRUE(how.grid);
+    EXPECT_EQ(how.method, DepthMethod::Grid);
     double sum = 0;
     std::size_t lit = 0;
     for (std::size_t i = 0; i < found.size(); ++i) {
@@ -280,7 +319,7 @@ double flicker(const Cloud& cloud, const layout::Light& light, double error, int
     Approximation how;
     const std::vector<float> slots =
         transmittances(approximateOpticalDepths(tree, slotsOf(tree), with, {}, {error, true}, how), with);
-    grids += how.grid;
+    grids += how.method != DepthMethod::Exact;
     std::vector<float> found(slots.size());
     for (std::size_t slot = 0; slot < slots.size(); ++slot) found[tree.source[slot]] = slots[slot];
     if (!last.empty()) greatest = std::max(greatest, meanDifference(last, found));

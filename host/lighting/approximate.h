@@ -1,13 +1,11 @@
 // Optical depths within an error that was asked for, by the cheapest way, and the error measured.
 #pragma once
-#include <string>
+#include <functional>
 
+#include "host/lighting/error_probes.h"
 #include "host/lighting/light_grid.h"
 
 namespace mote {
-
-/// Receivers whose transmittance is also computed exactly.
-constexpr std::size_t kErrorProbes = 2048;
 
 /// What an approximation must keep.
 struct ErrorWanted {
@@ -20,28 +18,46 @@ struct ErrorWanted {
   double aim() const { return animated ? mean / 6 : mean; }
 };
 
-/// How the light of one light was computed. Errors are |ΔT| against exact sums over the same tree, at probes drawn at
-/// random; with three colours, their mean.
-struct Approximation {
-  bool grid = false;  ///< by a light grid; else exactly, and all that follows is 0
-  GridResolution resolution;
-  double cellRadii = 0;          ///< the cell where the receivers are, in mean support radii
-  double allowed = 0;            ///< mean |ΔT| that was asked for, a sixth of it where frames must not flicker
-  double mean = 0;               ///< measured …
-  double upper = 0;              ///< … its upper 99 % confidence limit, ≤ allowed
-  double p99 = 0, greatest = 0;  ///< 99th percentile and greatest of the probes
-  std::size_t probes = 0;
-  int tries = 0;  ///< grids that were computed, the last of which met the error
+enum class DepthMethod {
+  Exact,
+  Grid,   ///< light_grid.h
+  Detail  ///< level_of_detail.h
 };
 
+/// How the light of one light was computed.
+struct Approximation {
+  DepthMethod method = DepthMethod::Exact;
+  GridResolution resolution;      ///< of a grid
+  double cellRadii = 0;           ///< of a grid: its cell where the receivers are, in mean support radii
+  double tolerance = 0;           ///< of level of detail
+  std::size_t treeParticles = 0;  ///< of level of detail: stand-ins and the particles beside them
+  double allowed = 0;             ///< mean |ΔT| that was asked for, a sixth of it where frames must not flicker
+  MeasuredError error;            ///< its upper limit ≤ allowed; nothing measured for exact light
+  int tries = 0;                  ///< approximations that were computed, the last of which met the error
+};
+
+/// What computes optical depths, on the host or on a device.
+struct DepthSources {
+  /// As opticalDepths, of any tree.
+  std::function<std::vector<float>(const Octree&, const Receivers&, const layout::Light&, const LightingOptions&,
+                                   std::span<const std::uint8_t> reached, const RaysDone&)>
+      exact;
+  /// As gridOpticalDepths.
+  std::function<std::vector<float>(const Octree&, const Receivers&, const layout::Light&, const LightingOptions&,
+                                   const GridResolution&, std::span<const std::uint8_t> reached, const RaysDone&)>
+      grid;
+};
+/// On TBB.
+const DepthSources& hostDepths();
+
 /// As opticalDepths, with a mean |ΔT| over the reached receivers of at most `wanted`: the upper 99 % limit of the mean
-/// at kErrorProbes of them is within it, or the result is exact. A cost model decides where exact sums are cheaper, so
-/// nothing depends on the machine's speed; what it chose stands in `chosen`. Receivers that no light reaches take no
-/// part. The grid is tried as fine as a model of its error says and made finer by what is measured; `shadow_density`
-/// and extinction count, as they decide what an error of τ does to T.
+/// at kErrorProbes of them (ErrorProbes, always on the host) is within it, or the result is exact. A cost model decides
+/// which method is cheapest, so nothing depends on the machine's speed; what it chose stands in `chosen`. Receivers
+/// that no light reaches take no part. A method is tried as coarse as a model of its error says and made finer by what
+/// is measured; `shadow_density` and extinction count, as they decide what an error of τ does to T.
 std::vector<float> approximateOpticalDepths(const Octree& tree, const Receivers& receivers, const layout::Light& light,
                                             const LightingOptions& options, const ErrorWanted& wanted,
                                             Approximation& chosen, std::span<const std::uint8_t> reached = {},
-                                            const RaysDone& done = {});
+                                            const RaysDone& done = {}, const DepthSources& sources = hostDepths());
 
 }  // namespace mote

@@ -17,14 +17,10 @@ layout(location = 0) flat out vec4 centreAndPeak;
 layout(location = 1) flat out vec4 imageAndPixel;
 layout(location = 2) flat out vec4 radianceAndOpacity;
 layout(location = 3) flat out float depth;
-layout(location = 4) out vec2 uv;  // in units of the effective radius, in the plane of the centre; (0, 0) there, v up
 
 void emitCorner(vec2 corner) {
-  // w = 1: everything is linear over the picture, so uv is too. z only has to lie in the view volume; near and far have
-  // been decided by the centre's depth.
+  // z only has to lie in the view volume; near and far have been decided by the centre's depth.
   gl_Position = vec4(corner / params.camera.imageSize * 2.0 - 1.0, 0.5, 1.0);
-  const vec2 offset = (corner - imageAndPixelIn[0].zw) * vec2(params.camera.pixelSize, -params.camera.pixelSize);
-  uv = offset * centreAndPeakIn[0].z;
   centreAndPeak = centreAndPeakIn[0];
   imageAndPixel = imageAndPixelIn[0];
   radianceAndOpacity = radianceAndOpacityIn[0];

@@ -70,8 +70,10 @@ BenchCheck withinError(const std::vector<float>& found, const std::vector<float>
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(double(a[i]) - double(b[i]));
   const double mean = sum / static_cast<double>(a.size());
-  const std::string how =
-      chosen.grid ? fmt::format("grid of {:.2f} radii", chosen.cellRadii) : std::string("exact sums");
+  const std::string how = chosen.method == DepthMethod::Grid ? fmt::format("grid of {:.2f} radii", chosen.cellRadii)
+                          : chosen.method == DepthMethod::Detail
+                              ? fmt::format("{} particles and stand-ins", chosen.treeParticles)
+                              : std::string("exact sums");
   return {fmt::format("mean |ΔT| {:.5f} over all particles (limit {}), by {}", mean, kError, how), mean <= kError};
 }
 

@@ -16,7 +16,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 std::string nameOf(const Approximation& chosen) {
-  if (!chosen.grid) return "Mote, exact";
+  if (chosen.method == DepthMethod::Exact) return "Mote, exact";
+  if (chosen.method == DepthMethod::Detail)
+    return fmt::format("Mote, {} particles and stand-ins, tries {}", chosen.treeParticles, chosen.tries);
   return fmt::format("Mote, grid of {:.2f} radii, tries {}", chosen.cellRadii, chosen.tries);
 }
 
