@@ -16,6 +16,7 @@
 #include "host/core/log.h"
 #include "host/core/timer.h"
 #include "host/splat/rasterize_full.h"
+#include "host/splat/small_splats.h"
 #include "host/splat/splat.h"
 
 namespace mote {
@@ -64,6 +65,7 @@ class DeviceRasterizer : public Rasterizer {
       : device_(device),
         set_(std::move(set)),
         stats_(stats),
+        keyScale_(keyScale),
         count_(static_cast<std::uint32_t>(set_.particles.size())) {
     Timer timer;
     std::vector<std::uint64_t> sizes = drawnSizes(count_);
@@ -178,12 +180,16 @@ class DeviceRasterizer : public Rasterizer {
     const SplatPass pass(device_, camera.falloff, withDepth);
     makeRoom(pass.drawingCost(width, height));
     const SplatTarget target = pass.createTarget(width, height);
+    if (!small_) small_ = smallSplatsFirst(set_.particles, camera, keyScale_, SplatPass::smallSide(device_));
     bool keep = false;
+    std::uint32_t drawn = 0;
     drawInParts(pass.downloadCost(width, height), progress,
                 [&](const Drawn& part, std::uint32_t count, const std::function<void(std::uint32_t)>& advance) {
                   TimestampQueries queries = device_.createTimestampQueries(pass.submissions(count));
-                  pass.draw(target, part.splats.particles, part.indices, count, camera, &queries, advance, keep);
+                  const std::uint32_t small = std::clamp(*small_, drawn, drawn + count) - drawn;
+                  pass.draw(target, part.splats.particles, part.indices, count, camera, &queries, advance, keep, small);
                   keep = true;
+                  drawn += count;
                   addTimes(queries);
                 });
     return pass.download(target);
@@ -209,7 +215,9 @@ class DeviceRasterizer : public Rasterizer {
   const Device& device_;
   SplatSet set_;
   FrameStats& stats_;
+  float keyScale_;
   std::uint32_t count_;
+  std::optional<std::uint32_t> small_;       // of the order's first, known when they are drawn the fast way
   std::optional<Drawn> resident_;            // all of them, in the set's order; empty: drawn in parts
   mutable std::vector<layout::uint> order_;  // empty while it is only on the device
   std::unique_ptr<FullSplatPass> full_;

@@ -13,6 +13,7 @@
 #include "host/core/parallel.h"
 #include "host/core/random.h"
 #include "host/splat/footprint.h"
+#include "host/splat/small_splats.h"
 
 namespace mote {
 namespace {
@@ -232,6 +233,31 @@ TEST(Footprint, BoundsHoldEveryPixelThatTheOracleSees) {
 }
 
 // ---- one particle ----
+
+TEST(SmallSplats, AreThoseBeforeTheFirstWideOne) {
+  const SplatCamera camera =
+      makeSplatCamera(vec3(0), vec3(0, 0, -1), vec3(0, 1, 0), 60, 0.01f, 1000, 320, 200, layout::kFalloffSmooth);
+  std::vector<SplatParticle> particles;
+  for (std::uint64_t i = 0; i < 40000; ++i) {
+    Random random(5, i);
+    const float z = static_cast<float>(random.uniform(0.2, 20));
+    particles.push_back({vec3(z * random.uniform(-1.5, 1.5), z * random.uniform(-1.0, 1.0), -z),
+                         static_cast<float>(0.01 * std::exp(random.uniform(0.0, 4.0))), vec3(1), 1});
+  }
+  const std::vector<layout::uint> order = sortByDepth(particles, camera, 1.0f / 32);
+  for (const float side : {0.0f, 5.0f, 20.0f, 63.0f, 1000.0f}) {
+    std::size_t expected = 0;
+    for (; expected < order.size(); ++expected) {
+      const SplatParticle& particle = particles[order[expected]];
+      Footprint f;
+      if (!makeFootprint(particle.position, particle.radius, camera, f)) continue;
+      const vec2 size = glm::floor(f.hi + 0.5f) - glm::ceil(glm::max(f.lo - 0.5f, vec2(0)));
+      if (std::max(size.x, size.y) > side) break;
+    }
+    EXPECT_EQ(smallSplatsFirst(particles, camera, 1.0f / 32, side), expected) << side;
+  }
+  EXPECT_EQ(smallSplatsFirst({}, camera, 1, 10), 0u);
+}
 
 TEST(Rasterize, OneParticleMatchesTheDoublePrecisionOracle) {
   double worst = 0, worstAlpha = 0;

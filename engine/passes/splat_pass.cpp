@@ -17,10 +17,13 @@ constexpr VkFormat kDepthFormat = VK_FORMAT_R32_SFLOAT;
 // Ids in splat.frag.
 constexpr std::uint32_t kFalloffId = 0, kDepthAlphaId = 1, kNoDepthId = 2;
 
-GraphicsPipelineInfo pipelineInfo(layout::uint falloff, bool withDepth) {
+/// Wider points waste more of their square than they save.
+constexpr float kMostPointSide = 64;
+
+GraphicsPipelineInfo pipelineInfo(layout::uint falloff, bool withDepth, bool points) {
   GraphicsPipelineInfo info;
-  info.vertex = spirv::splat_vert;
-  info.geometry = spirv::splat_geom;
+  info.vertex = points ? std::span<const std::uint32_t>(spirv::splat_point_vert) : spirv::splat_vert;
+  if (!points) info.geometry = spirv::splat_geom;
   info.fragment = spirv::splat_frag;
   info.targets = {{kColorFormat, Blend::PremultipliedOver}};
   if (withDepth) info.targets.push_back({kDepthFormat, Blend::Min});
@@ -44,8 +47,14 @@ SplatPass::SplatPass(const Device& device, layout::uint falloff, bool withDepth,
       falloff_(falloff),
       withDepth_(withDepth),
       pointsPerSubmit_(pointsPerSubmit),
-      pipeline_(device.createGraphicsPipeline(pipelineInfo(falloff, withDepth))) {
+      quads_(device.createGraphicsPipeline(pipelineInfo(falloff, withDepth, false))),
+      points_(device.createGraphicsPipeline(pipelineInfo(falloff, withDepth, true))) {
   MOTE_CHECK(pointsPerSubmit, >, 0u);
+}
+
+float SplatPass::smallSide(const Device& device) {
+  // A point may be a pixel wider than the splat.
+  return device.mostPointSide() < 2 ? 0 : std::min(device.mostPointSide(), kMostPointSide) - 1;
 }
 
 std::uint64_t SplatPass::downloadCost(std::uint32_t width, std::uint32_t height) const {
@@ -67,7 +76,8 @@ SplatTarget SplatPass::createTarget(std::uint32_t width, std::uint32_t height) c
 }
 
 void SplatPass::record(CommandBuffer& commands, const SplatTarget& target, const Buffer& particles, const Buffer& order,
-                       std::uint32_t first, std::uint32_t count, const layout::SplatCamera& camera, bool keep) const {
+                       std::uint32_t first, std::uint32_t count, const layout::SplatCamera& camera, bool keep,
+                       std::uint32_t small) const {
   MOTE_CHECK((std::uint64_t{first} + count) * sizeof(std::uint32_t), <=, order.size());
   MOTE_CHECK(camera.falloff, ==, falloff_);
   MOTE_CHECK(camera.imageSize.x, ==, static_cast<float>(target.color.width()));
@@ -77,10 +87,10 @@ void SplatPass::record(CommandBuffer& commands, const SplatTarget& target, const
     commands.beginRendering({color, {target.depth, VkClearColorValue{{kNoDepth}}, keep}});
   else
     commands.beginRendering({color});
-  if (count > 0) {
-    const layout::SplatParams params{.particles = particles.address(), .camera = camera, .pad = 0};
-    commands.drawIndexed(pipeline_, params, order, count, first);
-  }
+  const layout::SplatParams params{.particles = particles.address(), .camera = camera, .pad = 0};
+  const std::uint32_t points = std::clamp(small, first, first + count) - first;
+  if (points > 0) commands.drawIndexed(points_, params, order, points, first);
+  if (points < count) commands.drawIndexed(quads_, params, order, count - points, first + points);
   commands.endRendering();
 }
 
@@ -90,13 +100,13 @@ std::uint32_t SplatPass::submissions(std::uint32_t count) const {
 
 void SplatPass::draw(const SplatTarget& target, const Buffer& particles, const Buffer& order, std::uint32_t count,
                      const layout::SplatCamera& camera, TimestampQueries* times,
-                     const std::function<void(std::uint32_t)>& progress, bool keep) const {
+                     const std::function<void(std::uint32_t)>& progress, bool keep, std::uint32_t small) const {
   std::uint32_t first = 0;
   do {  // at least once: without points the target may have to be cleared
     const std::uint32_t part = std::min(count - first, pointsPerSubmit_);
     device_.run([&](CommandBuffer& commands) {
       const std::uint32_t span = times ? times->begin(commands, "splat") : 0;
-      record(commands, target, particles, order, first, part, camera, keep || first > 0);
+      record(commands, target, particles, order, first, part, camera, keep || first > 0, small);
       if (times) times->end(commands, span);
     });
     first += part;

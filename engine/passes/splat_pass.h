@@ -1,5 +1,5 @@
-// The splat pass: particles in back-to-front order, each a quad out of the geometry shader, blended over a float
-// picture.
+// The splat pass: particles in back-to-front order, each a quad out of the geometry shader, or a point where it is
+// small, blended over a float picture.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -31,6 +31,10 @@ class SplatPass {
   SplatPass(const Device& device, layout::uint falloff, bool withDepth,
             std::uint32_t pointsPerSubmit = kPointsPerSubmit);
 
+  /// Widest and highest splats [pixels] that are small (smallSplatsFirst): one point each, without a geometry shader,
+  /// the same pixels in two thirds of the time on lavapipe. 0: no splat is.
+  static float smallSide(const Device& device);
+
   /// What drawing and downloading pictures of this size [pixels, ≥ 1] take of the device's budget beside the particles.
   std::uint64_t drawingCost(std::uint32_t width, std::uint32_t height) const;
   /// … of it what download() takes while the target is there.
@@ -42,19 +46,21 @@ class SplatPass {
   /// Draws `count` points from element `first` of `order` on: uint32 indices into `particles` (SplatParticle), which
   /// the caller keeps in range. `keep` draws over what the target holds, else it is cleared first (also for count 0).
   /// The camera has the target's imageSize and the pass's falloff. Orders itself after earlier drawing on the target,
-  /// not after the writing of the buffers: computeToIndexAndVertexInput does that.
+  /// not after the writing of the buffers: computeToIndexAndVertexInput does that. The first `small` of `order` are
+  /// known to be small.
   void record(CommandBuffer& commands, const SplatTarget& target, const Buffer& particles, const Buffer& order,
-              std::uint32_t first, std::uint32_t count, const layout::SplatCamera& camera, bool keep) const;
+              std::uint32_t first, std::uint32_t count, const layout::SplatCamera& camera, bool keep,
+              std::uint32_t small = 0) const;
 
   /// Submissions that draw() makes for `count` points, ≥ 1: the spans that its timestamps need.
   std::uint32_t submissions(std::uint32_t count) const;
 
   /// Records and submits all `count` points in parts; returns when they are drawn, over what the target holds where
   /// `keep` is set. `times`, where given, gets one span "splat" a submission; `progress` the number of points drawn so
-  /// far, after each.
+  /// far, after each. `small` as for record.
   void draw(const SplatTarget& target, const Buffer& particles, const Buffer& order, std::uint32_t count,
             const layout::SplatCamera& camera, TimestampQueries* times = nullptr,
-            const std::function<void(std::uint32_t)>& progress = {}, bool keep = false) const;
+            const std::function<void(std::uint32_t)>& progress = {}, bool keep = false, std::uint32_t small = 0) const;
 
   /// The target's picture, with depth where the pass has it. Throws MachineError where host-visible memory is short.
   Image download(const SplatTarget& target) const;
@@ -64,7 +70,7 @@ class SplatPass {
   layout::uint falloff_;
   bool withDepth_;
   std::uint32_t pointsPerSubmit_;
-  GraphicsPipeline pipeline_;
+  GraphicsPipeline quads_, points_;
 };
 
 }  // namespace mote

@@ -25,10 +25,14 @@ QueueFamily graphicsAndCompute(VkPhysicalDevice device) {
   throw MachineError("the Vulkan device has no queue with graphics and compute");
 }
 
-VkBool32 shaderFloat64(VkPhysicalDevice physicalDevice) {
+/// What is used where there is, and done without elsewhere.
+struct OptionalFeatures {
+  VkBool32 shaderFloat64, largePoints;
+};
+OptionalFeatures optionalFeatures(VkPhysicalDevice physicalDevice) {
   VkPhysicalDeviceFeatures features;
   vkGetPhysicalDeviceFeatures(physicalDevice, &features);
-  return features.shaderFloat64;
+  return {features.shaderFloat64, features.largePoints};
 }
 
 VkDevice createLogicalDevice(VkPhysicalDevice physicalDevice, std::uint32_t queueFamily) {
@@ -42,7 +46,9 @@ VkDevice createLogicalDevice(VkPhysicalDevice physicalDevice, std::uint32_t queu
   features.features.geometryShader = features.features.independentBlend = VK_TRUE;
   features.features.dualSrcBlend = VK_TRUE;
   features.features.fullDrawIndexUint32 = features.features.shaderInt64 = VK_TRUE;
-  features.features.shaderFloat64 = shaderFloat64(physicalDevice);
+  const OptionalFeatures optional = optionalFeatures(physicalDevice);
+  features.features.shaderFloat64 = optional.shaderFloat64;
+  features.features.largePoints = optional.largePoints;
 
   const float priority = 1;
   auto queue = structure<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
@@ -103,8 +109,10 @@ Device::Device(VkPhysicalDevice physicalDevice, bool stageAlways, MemoryLimit li
   vkGetPhysicalDeviceProperties2(physicalDevice, &properties);
   name_ = properties.properties.deviceName;
   cpu_ = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
-  float64_ = shaderFloat64(physicalDevice) != VK_FALSE;
   limits_ = properties.properties.limits;
+  const OptionalFeatures optional = optionalFeatures(physicalDevice);
+  float64_ = optional.shaderFloat64 != VK_FALSE;
+  mostPointSide_ = optional.largePoints != VK_FALSE ? limits_.pointSizeRange[1] : 1;
   subgroupSize_ = subgroups.subgroupSize;
   leastSubgroupSize_ = std::min(subgroups.subgroupSize, std::max(sizes.minSubgroupSize, 1u));
   mostSubgroupSize_ = std::max(subgroups.subgroupSize, sizes.maxSubgroupSize);

@@ -35,6 +35,8 @@ class Device {
   bool isCpu() const { return cpu_; }
   /// Double precision in shaders: optional, what needs it does without.
   bool hasFloat64() const { return float64_; }
+  /// Largest side of a point [pixels]; 1 where there is no choice.
+  float mostPointSide() const { return mostPointSide_; }
   /// Invocations a subgroup: what shaders usually get, and the least and most that a driver may choose.
   std::uint32_t subgroupSize() const { return subgroupSize_; }
   std::uint32_t leastSubgroupSize() const { return leastSubgroupSize_; }
@@ -109,6 +111,7 @@ class Device {
   bool stageAlways_;
   std::string name_;
   bool cpu_ = false, float64_ = false;
+  float mostPointSide_ = 1;
   std::uint32_t subgroupSize_ = 0, leastSubgroupSize_ = 0, mostSubgroupSize_ = 0;
   VkPhysicalDeviceLimits limits_{};
   VkPhysicalDeviceMemoryProperties memory_{};

@@ -6,6 +6,7 @@
 #include "engine/passes/splat_pass.h"
 #include "host/core/error.h"
 #include "host/core/random.h"
+#include "host/splat/small_splats.h"
 #include "host/splat/splat.h"
 #include "tests/gpu/gpu_fixture.h"
 
@@ -106,11 +107,11 @@ Difference difference(const Image& a, const Image& b) {
 class SplatPassTest : public GpuTest {
  protected:
   Image draw(const SplatPass& pass, std::span<const SplatParticle> particles, std::span<const uint> order,
-             const SplatCamera& camera) {
+             const SplatCamera& camera, std::uint32_t small = 0) {
     const SplatTarget target = pass.createTarget(static_cast<std::uint32_t>(camera.imageSize.x),
                                                  static_cast<std::uint32_t>(camera.imageSize.y));
     pass.draw(target, device().createBufferWith(particles), device().createBufferWith(order),
-              static_cast<std::uint32_t>(order.size()), camera);
+              static_cast<std::uint32_t>(order.size()), camera, nullptr, {}, false, small);
     return pass.download(target);
   }
   Image draw(std::span<const SplatParticle> particles, std::span<const uint> order, const SplatCamera& camera,
@@ -180,6 +181,37 @@ TEST_F(SplatPassTest, EveryKindOfParticleEqualsTheHostRasteriser) {
     const SplatCamera camera = obliqueCamera(641, 359, 50, kind);
     const std::vector<SplatParticle> cloud = everyKindOfParticle(camera, 8000);
     expectEqualsHost(cloud, sortByDepth(cloud, camera, 1.0f / 128), camera);
+  }
+}
+
+TEST_F(SplatPassTest, SmallSplatsAreTheSameAsPoints) {
+  const float side = SplatPass::smallSide(device());
+  ASSERT_GE(side, 16);  // lavapipe has large points
+  for (const uint kind : kFalloffs) {
+    const SplatCamera camera = obliqueCamera(641, 359, 50, kind);
+    const std::vector<SplatParticle> cloud = everyKindOfParticle(camera, 8000);
+    const std::vector<uint> order = sortByDepth(cloud, camera, 1.0f / 128);
+    const std::uint32_t small = smallSplatsFirst(cloud, camera, 1.0f / 128, side);
+    EXPECT_GT(small, 0u);
+    EXPECT_LT(small, cloud.size());
+    const SplatPass pass(device(), kind, true, 1000);  // the change from points to quads is within a submission
+    const Image quads = draw(pass, cloud, order, camera), both = draw(pass, cloud, order, camera, small);
+    EXPECT_EQ(both.pixels, quads.pixels);
+    EXPECT_EQ(both.depth, quads.depth);
+  }
+  // At the picture's edges and corners, with sides of even and odd length.
+  const SplatCamera camera =
+      makeSplatCamera(vec3(0), vec3(0, 0, -1), vec3(0, 1, 0), 60, 0.01f, 1000, 61, 40, layout::kFalloffSmooth);
+  for (int i = 0; i < 200; ++i) {
+    Random random(3, static_cast<std::uint64_t>(i));
+    const SplatParticle particle{vec3(random.uniform(-1.2, 1.2), random.uniform(-0.8, 0.8), -1),
+                                 static_cast<float>(random.uniform(0.01, 0.5)), vec3(0.5f, 1, 0.1f), 2};
+    if (smallSplatsFirst(std::span(&particle, 1), camera, 1, side) == 0) continue;
+    const SplatPass pass(device(), camera.falloff, true);
+    const Image quad = draw(pass, std::span(&particle, 1), identity(1), camera),
+                point = draw(pass, std::span(&particle, 1), identity(1), camera, 1);
+    ASSERT_EQ(point.pixels, quad.pixels) << i;
+    ASSERT_EQ(point.depth, quad.depth) << i;
   }
 }
 

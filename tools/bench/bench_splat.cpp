@@ -3,6 +3,7 @@
 #include "engine/passes/splat_pass.h"
 #include "host/core/parallel.h"
 #include "host/core/random.h"
+#include "host/splat/small_splats.h"
 #include "host/splat/splat.h"
 #include "tools/bench/bench_picture.h"
 
@@ -56,11 +57,14 @@ void benchSplat(Bench& bench) {
   const auto count = static_cast<std::uint32_t>(splats.size());
   const SplatPass pass(*device, camera.falloff, false);
   const SplatTarget target = pass.createTarget(kWidth, kHeight);
+  // Small or not does not depend on the distance here: all or none are.
+  const bool allSmall = smallSplatsFirst(splats, camera, 1, SplatPass::smallSide(*device)) == count;
+  const std::uint32_t small = allSmall ? count : 0;
   const Buffer particles = device->createBufferWith(std::span(splats));
   const Buffer indices = device->createBufferWith(std::span(order));
   Image onDevice;
   const Contender splatPass{"splat pass on the device, with download", [&] {
-                              pass.draw(target, particles, indices, count, camera);
+                              pass.draw(target, particles, indices, count, camera, nullptr, {}, false, small);
                               onDevice = pass.download(target);
                             }};
   bench.compare(name, "splats", host, splatPass, [&] { return samePicture(onHost, onDevice); });
