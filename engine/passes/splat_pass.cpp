@@ -43,13 +43,15 @@ void download(const Device& device, const Image2D& from, void* data, std::size_t
 }  // namespace
 
 SplatPass::SplatPass(const Device& device, layout::uint falloff, bool withDepth, std::uint32_t pointsPerSubmit)
-    : device_(device),
-      falloff_(falloff),
-      withDepth_(withDepth),
-      pointsPerSubmit_(pointsPerSubmit),
-      quads_(device.createGraphicsPipeline(pipelineInfo(falloff, withDepth, false))),
-      points_(device.createGraphicsPipeline(pipelineInfo(falloff, withDepth, true))) {
+    : device_(device), falloff_(falloff), withDepth_(withDepth), pointsPerSubmit_(pointsPerSubmit) {
   MOTE_CHECK(pointsPerSubmit, >, 0u);
+}
+
+const GraphicsPipeline& SplatPass::pipeline(bool points) const {
+  GraphicsPipeline& made = points ? points_ : quads_;
+  if (made.handle() == VK_NULL_HANDLE)
+    made = device_.createGraphicsPipeline(pipelineInfo(falloff_, withDepth_, points));
+  return made;
 }
 
 float SplatPass::smallSide(const Device& device) {
@@ -89,8 +91,8 @@ void SplatPass::record(CommandBuffer& commands, const SplatTarget& target, const
     commands.beginRendering({color});
   const layout::SplatParams params{.particles = particles.address(), .camera = camera, .pad = 0};
   const std::uint32_t points = std::clamp(small, first, first + count) - first;
-  if (points > 0) commands.drawIndexed(points_, params, order, points, first);
-  if (points < count) commands.drawIndexed(quads_, params, order, count - points, first + points);
+  if (points > 0) commands.drawIndexed(pipeline(true), params, order, points, first);
+  if (points < count) commands.drawIndexed(pipeline(false), params, order, count - points, first + points);
   commands.endRendering();
 }
 

@@ -66,11 +66,13 @@ class SplatPass {
   Image download(const SplatTarget& target) const;
 
  private:
+  const GraphicsPipeline& pipeline(bool points) const;
+
   const Device& device_;
   layout::uint falloff_;
   bool withDepth_;
   std::uint32_t pointsPerSubmit_;
-  GraphicsPipeline quads_, points_;
+  mutable GraphicsPipeline quads_, points_;  // made when they are first drawn with
 };
 
 }  // namespace mote
