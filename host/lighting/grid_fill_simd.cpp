@@ -296,17 +296,37 @@ float ownShare(const GridParticles& p, std::size_t i, const Footprint& f, float 
   return scale * (lower + wy * (upper - lower)) * (before + wd * (after - before));
 }
 
+/// Draws the particle's kernel into `f`.
+template <layout::uint kFalloff>
+HWY_INLINE LoneKernel weighLone(const GridTile& tile, std::size_t i, Footprint& f) {
+  static thread_local std::vector<float> weighted;
+  const GridParticles& p = tile.particles;
+  const float sum =
+      p.curved[i] > 0 ? drawCurvedFootprint<kFalloff>(tile, i, f, weighted) : drawFootprint<kFalloff>(p, i, f);
+  LoneKernel kernel{f.x0, f.y0, f.columns, f.rows};
+  if (!(sum > 0)) return kernel;
+  kernel.scale = p.mass[i] / sum;
+  kernel.own = ownShare(p, i, f, kernel.scale);
+  return kernel;
+}
+
+LoneKernel weighOne(const GridTile& tile, std::size_t i) {
+  static thread_local Footprint f;
+  switch (tile.falloff) {
+    case layout::kFalloffLinear: return weighLone<layout::kFalloffLinear>(tile, i, f);
+    case layout::kFalloffSphere: return weighLone<layout::kFalloffSphere>(tile, i, f);
+    default: return weighLone<layout::kFalloffSmooth>(tile, i, f);
+  }
+}
+
 template <layout::uint kFalloff>
 HWY_NOINLINE void putDownAlone(GridTile& tile, std::size_t i) {
   static thread_local Footprint f;
-  static thread_local std::vector<float> weighted;
   GridParticles& p = tile.particles;
-  const float sum =
-      p.curved[i] > 0 ? drawCurvedFootprint<kFalloff>(tile, i, f, weighted) : drawFootprint<kFalloff>(p, i, f);
-  p.own[i] = 0;
-  if (!(sum > 0)) return;
-  const float scale = p.mass[i] / sum, inverse = 1.0f / p.depthRadius[i];
-  p.own[i] = ownShare(p, i, f, scale);
+  const LoneKernel kernel = weighLone<kFalloff>(tile, i, f);
+  p.own[i] = kernel.own;
+  if (!(kernel.scale > 0)) return;
+  const float scale = kernel.scale, inverse = 1.0f / p.depthRadius[i];
   const int last = tile.shape->tileCells;
   const int rowBegin = std::max(f.y0, 0), rowEnd = std::min(f.y0 + f.rows - 1, last);
   const int columnBegin = std::max(f.x0, 0), columnEnd = std::min(f.x0 + f.columns - 1, last);
@@ -330,16 +350,6 @@ HWY_NOINLINE void putDownAlone(GridTile& tile, std::size_t i) {
 }
 
 // ---- fill
-
-/// Nodes across of the window that a particle goes through a batch with; 0: it is not put down, kAlone: alone.
-constexpr int kAlone = kMostWindow + 1;
-HWY_INLINE int windowOf(const GridParticles& p, std::size_t i) {
-  if (!(p.half[i] > 0)) return 0;
-  const float nodes = std::max(std::ceil(2 * p.half[i]), 2.0f);
-  const bool alone =
-      nodes > kMostWindow || p.curved[i] > 0 || (p.lastBin[i] >> 2) - (p.firstBin[i] >> 2) >= kMostGroups;
-  return alone ? kAlone : static_cast<int>(nodes);
-}
 
 template <layout::uint kFalloff, int kNodes>
 HWY_INLINE void fillBatch(GridTile& tile, std::size_t first, const int (&window)[kGridBatch], Batch& batch) {
@@ -460,7 +470,11 @@ namespace mote {
 
 HWY_EXPORT(fill);
 HWY_EXPORT(read);
+HWY_EXPORT(weighOne);
 
+LoneKernel weighAlone(const GridTile& tile, std::size_t particle) {
+  return HWY_DYNAMIC_DISPATCH(weighOne)(tile, particle);
+}
 void fillTile(GridTile& tile) { HWY_DYNAMIC_DISPATCH(fill)(tile); }
 void readTile(const GridTile& tile, std::vector<float>& depths) {
   depths.resize(tile.channels * tile.receivers);

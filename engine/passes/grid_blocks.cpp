@@ -1,0 +1,249 @@
+#include "engine/passes/grid_blocks.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/core/parallel.h"
+
+namespace mote {
+namespace {
+
+constexpr int kEdge = static_cast<int>(layout::kBlockEdge);
+constexpr std::size_t kBlocks = layout::kTileBlocks * layout::kTileBlocks;
+static_assert(kTileCells + 1 <= kEdge * static_cast<int>(layout::kTileBlocks));
+static_assert(kGroupBins == layout::kBlockBins);
+
+/// Nodes: the device may round in another way than what says which a kernel covers.
+constexpr float kSlack = 1e-3f;
+
+/// Nodes from lo to hi, within the tile; none where hi < lo.
+struct Nodes {
+  float lo, hi;
+  Nodes(float from, float to) : lo(std::max(std::ceil(from), 0.0f)), hi(std::min(std::floor(to), float{kTileCells})) {}
+  bool empty() const { return !(lo <= hi); }
+  std::uint8_t firstBlock() const { return static_cast<std::uint8_t>(static_cast<int>(lo) / kEdge); }
+  std::uint8_t lastBlock() const { return static_cast<std::uint8_t>(static_cast<int>(hi) / kEdge); }
+};
+
+/// Group by number among those that the tile has; < 0: left out.
+int numberOf(const GridTile& tile, int group) { return tile.placeOfGroup(group) / kGroupBins - 1; }
+
+}  // namespace
+
+GridArrays::Pieces& GridArrays::piecesOf(std::uint32_t round, std::uint32_t kinds) {
+  const auto before = [](const Pieces& a, const std::pair<std::uint32_t, std::uint32_t>& b) {
+    return std::pair(a.round, a.kinds) < b;
+  };
+  const auto at = std::lower_bound(pieces.begin(), pieces.end(), std::pair(round, kinds), before);
+  if (at != pieces.end() && at->round == round && at->kinds == kinds) return *at;
+  return *pieces.insert(at, {round, kinds, {}});
+}
+
+std::size_t GridArrays::strands() const {
+  std::size_t count = 0;
+  for (const Pieces& p : pieces) count += p.strands.size();
+  return count;
+}
+
+void GridBlocks::setUp(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
+                       std::span<const std::uint32_t> slots, std::uint32_t lanes, std::uint32_t mostSteps) {
+  groups_ = static_cast<std::size_t>(*std::max_element(tile.groupAt.begin(), tile.groupAt.end())) / kGroupBins;
+  setKernels(tile);
+  countEntries();
+  setBlocks(tile, lanes, mostSteps);
+  setReceivers(tile, receivers, members, slots);
+}
+
+void GridBlocks::setKernels(const GridTile& tile) {
+  const GridParticles& p = tile.particles;
+  const std::size_t count = p.points.count;
+  const auto cell = static_cast<float>(tile.shape->resolution.cell);
+  const int lastGroup = tile.firstGroup + static_cast<int>(tile.groupAt.size()) - 1;
+  arrays_.kernels.resize(count);
+  reach_.resize(count);
+  kinds_.assign(kBlocks, 0);
+  for (std::size_t c = 0; c < tile.channels; ++c)
+    arrays_.peaks[c].assign(p.peak[c].begin(), p.peak[c].begin() + static_cast<std::ptrdiff_t>(count));
+  for (std::size_t i = 0; i < count; ++i) {
+    Reach& reach = reach_[i] = {0, 0, 0, 0, 0, -1};
+    layout::GridKernel& kernel = arrays_.kernels[i] = {};
+    const int window = windowOf(p, i);
+    if (window == 0) continue;
+    const float x = p.points.x[i], y = p.points.y[i], half = p.half[i] + kSlack;
+    kernel = {x,
+              y,
+              p.a[i],
+              p.b[i],
+              p.c[i],
+              p.depth[i],
+              1.0f / p.depthRadius[i],
+              p.points.depth[i],
+              p.mass[i],
+              window == 2 ? 2u : static_cast<layout::uint>(window)};
+    Nodes columns(x - half, x + half), rows(y - half, y + half);
+    std::uint32_t kind = window == 2 ? kTentKernels : kEllipseKernels;
+    if (window == kAlone) {
+      const LoneKernel lone = weighAlone(tile, i);
+      kernel.window = 0, kernel.mass = lone.scale, kernel.place = lone.own;
+      if (!(lone.scale > 0)) continue;
+      const auto column = static_cast<float>(lone.firstColumn), row = static_cast<float>(lone.firstRow);
+      columns = Nodes(column, column + static_cast<float>(lone.columns - 1));
+      rows = Nodes(row, row + static_cast<float>(lone.rows - 1));
+      if (p.curved[i] > 0) kind = kCurvedKernels, kernel.a = p.curved[i] * (cell * cell), kernel.b = 0, kernel.c = -1;
+    } else if (window == 2) {
+      kernel.c = 0;
+    }
+    const int first = numberOf(tile, p.firstBin[i] >> 2);
+    if (first < 0 || columns.empty() || rows.empty()) continue;
+    reach = {columns.firstBlock(),
+             columns.lastBlock(),
+             rows.firstBlock(),
+             rows.lastBlock(),
+             first,
+             first + std::min(p.lastBin[i] >> 2, lastGroup) - (p.firstBin[i] >> 2)};
+    for (std::size_t row = reach.firstRow; row <= reach.lastRow; ++row)
+      for (std::size_t column = reach.firstColumn; column <= reach.lastColumn; ++column)
+        kinds_[row * layout::kTileBlocks + column] |= kind;
+  }
+}
+
+template <class Each>
+void GridBlocks::eachEntry(const Each& each) const {
+  for (std::size_t i = 0; i < reach_.size(); ++i) {
+    const Reach& reach = reach_[i];
+    for (int row = reach.firstRow; row <= reach.lastRow; ++row)
+      for (int column = reach.firstColumn; column <= reach.lastColumn; ++column) {
+        const std::size_t at = static_cast<std::size_t>(row * static_cast<int>(layout::kTileBlocks) + column) * groups_;
+        for (int group = reach.firstGroup; group <= reach.lastGroup; ++group)
+          each(at + static_cast<std::size_t>(group), static_cast<std::uint32_t>(i));
+      }
+  }
+}
+
+void GridBlocks::countEntries() {
+  // Counts stand two places on, then beginnings one place on, which become ends and so the next one's beginnings.
+  start_.assign(kBlocks * groups_ + 2, 0);
+  eachEntry([&](std::size_t block, std::uint32_t) { ++start_[block + 2]; });
+  for (std::size_t k = 2; k < start_.size(); ++k) start_[k] += start_[k - 1];
+  arrays_.entries.resize(start_.back());
+  eachEntry([&](std::size_t block, std::uint32_t i) { arrays_.entries[start_[block + 1]++] = i; });
+}
+
+void GridBlocks::setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint32_t mostSteps) {
+  std::vector<float> binOf(groups_);
+  for (std::size_t k = 0; k < tile.groupAt.size(); ++k)
+    if (tile.groupAt[k] >= 0)
+      binOf[static_cast<std::size_t>(tile.groupAt[k] / kGroupBins - 1)] =
+          static_cast<float>((tile.firstGroup + static_cast<int>(k)) * kGroupBins);
+  arrays_.blocks.clear(), arrays_.pieces.clear();
+  arrays_.table.resize(kBlocks * groups_);
+  arrays_.storedBlocks = 0;
+  const double cell = tile.shape->resolution.cell;
+  for (std::size_t b = 0; b < kBlocks; ++b) {
+    const std::size_t column = b % layout::kTileBlocks * layout::kBlockEdge,
+                      row = b / layout::kTileBlocks * layout::kBlockEdge;
+    layout::GridStrand strand{static_cast<layout::uint>(arrays_.blocks.size()),
+                              0,
+                              static_cast<float>(column),
+                              static_cast<float>(row),
+                              static_cast<float>((tile.firstColumn + static_cast<double>(column)) * cell),
+                              static_cast<float>((tile.firstRow + static_cast<double>(row)) * cell)};
+    std::uint32_t round = 0, steps = 0, last = 0;
+    const auto finish = [&] {
+      strand.end = static_cast<layout::uint>(arrays_.blocks.size());
+      if (strand.end > strand.first) arrays_.piecesOf(round++, kinds_[b]).strands.push_back(strand);
+      strand.first = strand.end, steps = 0;
+    };
+    for (std::size_t g = 0; g < groups_; ++g) {
+      std::uint32_t first = start_[b * groups_ + g];
+      const std::uint32_t end = start_[b * groups_ + g + 1];
+      if (first < end) last = 2 * ++arrays_.storedBlocks;
+      arrays_.table[g * kBlocks + b] = last + (first < end ? 1 : 0);
+      while (first < end) {
+        const std::uint32_t here = std::min(end - first, (mostSteps - steps - 1) * lanes);
+        arrays_.blocks.push_back({first, first + here, arrays_.storedBlocks, binOf[g]});
+        first += here, steps += 1 + (here + lanes - 1) / lanes;
+        if (steps + 2 > mostSteps && (first < end || g + 1 < groups_)) {
+          finish();
+          // A piece that goes on begins with the last one's block, for what is left of it, or for nothing.
+          if (first == end) arrays_.blocks.push_back({end, end, arrays_.storedBlocks, binOf[g]}), steps = 2;
+        }
+      }
+    }
+    finish();
+  }
+}
+
+void GridBlocks::setReceivers(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
+                              std::span<const std::uint32_t> slots) {
+  const GridPoints& points = tile.receiverPoints();
+  arrays_.receivers.resize(members.size());
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    const std::int32_t bin = points.bin[k];
+    std::uint32_t self = kNoSlot;
+    if (tile.receiversAreParticles) {
+      self = static_cast<std::uint32_t>(k);
+    } else {
+      const std::uint32_t slot = receivers.selfOf(members[k]);
+      const auto at = std::lower_bound(slots.begin(), slots.end(), slot);
+      if (at != slots.end() && *at == slot) self = static_cast<std::uint32_t>(at - slots.begin());
+    }
+    arrays_.receivers[k] = {points.x[k],
+                            points.y[k],
+                            points.depth[k] - static_cast<float>(bin),
+                            static_cast<layout::uint>(bin & (kGroupBins - 1)),
+                            static_cast<layout::uint>(numberOf(tile, bin >> 2)) * static_cast<layout::uint>(kBlocks),
+                            self};
+  }
+}
+
+void join(std::span<const GridArrays* const> tiles, std::size_t channels, GridArrays& all) {
+  struct Base {
+    std::uint32_t kernels, entries, blocks, table, receivers, stored;
+  };
+  Base end{0, 0, 0, 0, 0, 1};  // the first stored block is the one of zeros
+  std::vector<Base> bases;
+  const auto number = [](const auto& array) { return static_cast<std::uint32_t>(array.size()); };
+  all.pieces.clear();
+  for (const GridArrays* tile : tiles) {
+    bases.push_back(end);
+    for (const GridArrays::Pieces& pieces : tile->pieces) {
+      std::vector<layout::GridStrand>& to = all.piecesOf(pieces.round, pieces.kinds).strands;
+      for (layout::GridStrand strand : pieces.strands) {
+        strand.first += end.blocks, strand.end += end.blocks;
+        to.push_back(strand);
+      }
+    }
+    end = {end.kernels + number(tile->kernels),     end.entries + number(tile->entries),
+           end.blocks + number(tile->blocks),       end.table + number(tile->table),
+           end.receivers + number(tile->receivers), end.stored + tile->storedBlocks};
+  }
+  all.kernels.resize(end.kernels), all.entries.resize(end.entries), all.blocks.resize(end.blocks);
+  all.table.resize(end.table), all.receivers.resize(end.receivers);
+  for (std::size_t c = 0; c < channels; ++c) all.peaks[c].resize(end.kernels);
+  all.storedBlocks = end.stored - 1;
+  parallelBlocks(tiles.size(), 1, [&](std::size_t t, std::size_t) {
+    const GridArrays& tile = *tiles[t];
+    const Base& base = bases[t];
+    std::copy(tile.kernels.begin(), tile.kernels.end(), all.kernels.begin() + base.kernels);
+    for (std::size_t c = 0; c < channels; ++c)
+      std::copy(tile.peaks[c].begin(), tile.peaks[c].end(), all.peaks[c].begin() + base.kernels);
+    for (std::size_t k = 0; k < tile.entries.size(); ++k)
+      all.entries[base.entries + k] = tile.entries[k] + base.kernels;
+    for (std::size_t k = 0; k < tile.blocks.size(); ++k) {
+      layout::GridBlock block = tile.blocks[k];
+      block.first += base.entries, block.end += base.entries, block.stored += base.stored - 1;
+      all.blocks[base.blocks + k] = block;
+    }
+    for (std::size_t k = 0; k < tile.table.size(); ++k)  // what lies before everything is the same block for all
+      all.table[base.table + k] = tile.table[k] < 2 ? 0 : tile.table[k] + 2 * (base.stored - 1);
+    for (std::size_t k = 0; k < tile.receivers.size(); ++k) {
+      layout::GridReceiver receiver = tile.receivers[k];
+      receiver.table += base.table;
+      if (receiver.self != kNoSlot) receiver.self += base.kernels;
+      all.receivers[base.receivers + k] = receiver;
+    }
+  });
+}
+
+}  // namespace mote

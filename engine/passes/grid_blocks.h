@@ -1,0 +1,70 @@
+// A tile of a light grid as the device takes it: particles by blocks of nodes and bins (shaders/glsl/layout/grid.h).
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "host/lighting/grid_tile.h"
+#include "shaders/glsl/layout/grid.h"
+
+namespace mote {
+
+/// What kernels of a strand are; a strand with several kinds has all their bits.
+enum GridKernelKinds : std::uint32_t { kTentKernels = 1, kEllipseKernels = 2, kCurvedKernels = 4 };
+
+/// Everything that dispatches read, of one tile, or of several one after the other.
+struct GridArrays {
+  /// Pieces of strands, which go through the device together.
+  struct Pieces {
+    std::uint32_t round = 0;  ///< after those of earlier rounds
+    std::uint32_t kinds = 0;
+    std::vector<layout::GridStrand> strands;
+  };
+
+  std::vector<layout::GridKernel> kernels;
+  std::vector<float> peaks[3];
+  std::vector<std::uint32_t> entries;
+  std::vector<layout::GridBlock> blocks;
+  std::vector<Pieces> pieces;  ///< by round, then by kinds
+  std::vector<std::uint32_t> table;
+  std::vector<layout::GridReceiver> receivers;
+  std::uint32_t storedBlocks = 0;  ///< without the one of zeros
+
+  Pieces& piecesOf(std::uint32_t round, std::uint32_t kinds);
+  std::size_t strands() const;
+};
+
+/// The arrays of a tile alone. A piece has as many steps as a shader may take: one a block, and one for each
+/// `lanes` of its particles. What a step is worth to the host: a few counts for each block that a particle touches.
+class GridBlocks {
+ public:
+  /// `tile` is set up; `members` its receivers, `slots` its particles.
+  void setUp(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
+             std::span<const std::uint32_t> slots, std::uint32_t lanes, std::uint32_t mostSteps);
+  const GridArrays& arrays() const { return arrays_; }
+
+ private:
+  /// Blocks and groups that a particle has entries in; firstGroup > lastGroup: none.
+  struct Reach {
+    std::uint8_t firstColumn, lastColumn, firstRow, lastRow;
+    std::int32_t firstGroup, lastGroup;
+  };
+  void setKernels(const GridTile& tile);
+  void countEntries();
+  void setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint32_t mostSteps);
+  void setReceivers(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
+                    std::span<const std::uint32_t> slots);
+  template <class Each>
+  void eachEntry(const Each& each) const;
+
+  GridArrays arrays_;
+  std::size_t groups_ = 0;
+  std::vector<Reach> reach_;
+  std::vector<std::uint32_t> start_;  // [block][group]: of entries
+  std::vector<std::uint32_t> kinds_;  // [block]
+};
+
+/// Puts the arrays of tiles behind one another.
+void join(std::span<const GridArrays* const> tiles, std::size_t channels, GridArrays& all);
+
+}  // namespace mote

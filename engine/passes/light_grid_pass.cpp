@@ -1,0 +1,222 @@
+#include "engine/passes/light_grid_pass.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "engine/passes/part_size.h"
+#include "host/core/parallel.h"
+#include "host/lighting/grid_near_light.h"
+#include "spirv.h"
+
+namespace mote {
+namespace {
+
+/// Particles and receivers of the tiles that are set up together.
+constexpr std::size_t kMostItems = std::size_t{1} << 18;
+/// Of all arrays of a batch.
+constexpr std::uint64_t kBatchBytes = std::uint64_t{64} << 20;
+/// Of a shader's loops: lavapipe ends them after 65535 altogether.
+constexpr std::uint32_t kMostSteps = 60000;
+
+}  // namespace
+
+/// A tile that is set up, or on its way through the device.
+struct LightGridPass::Work {
+  GridTile tile;
+  GridBlocks blocks;
+  std::span<const std::uint32_t> members;
+};
+
+LightGridPass::LightGridPass(const Device& device)
+    : device_(device),
+      queries_(device.createTimestampQueries(1)),
+      groupSize_(device.isCpu() ? device.subgroupSize() : std::max(64u, device.mostSubgroupSize())),
+      storeLanes_(std::min(8u, device.leastSubgroupSize())) {}
+
+const ComputePipeline& LightGridPass::weigh(layout::uint falloff) {
+  ComputePipeline& made = weighs_[falloff];
+  if (made.handle() == VK_NULL_HANDLE)
+    made = device_.createComputePipeline(spirv::grid_weigh_comp, sizeof(layout::GridParams),
+                                         std::array<SpecializationConstant, 2>{{{0, groupSize_}, {1, falloff}}});
+  return made;
+}
+
+const ComputePipeline& LightGridPass::fill(const FillVariant& variant) {
+  ComputePipeline& made = fills_[variant];
+  if (made.handle() != VK_NULL_HANDLE) return made;
+  const auto has = [&](std::uint32_t kind) { return std::uint32_t{(variant.kinds & kind) != 0}; };
+  made = device_.createComputePipeline(spirv::grid_fill_comp, sizeof(layout::GridParams),
+                                       std::array<SpecializationConstant, 7>{{{0, groupSize_},
+                                                                              {1, variant.falloff},
+                                                                              {2, has(kTentKernels)},
+                                                                              {3, has(kEllipseKernels)},
+                                                                              {4, has(kCurvedKernels)},
+                                                                              {5, variant.goesOn},
+                                                                              {6, storeLanes_}}});
+  return made;
+}
+
+LightGridPass::Sizes LightGridPass::sizesOf(const GridArrays& a) const {
+  constexpr std::uint64_t kFloat = sizeof(float), kUint = sizeof(layout::uint);
+  const std::uint64_t kernels = a.kernels.size(), receivers = a.receivers.size();
+  return {kernels * sizeof(layout::GridKernel),
+          kernels * kFloat,
+          kernels * kFloat,
+          kernels * kFloat,
+          a.entries.size() * kUint,
+          a.blocks.size() * sizeof(layout::GridBlock),
+          a.strands() * sizeof(layout::GridStrand),
+          (1 + std::uint64_t{a.storedBlocks}) * layout::kBlockFloats * kFloat,
+          a.table.size() * kUint,
+          receivers * sizeof(layout::GridReceiver),
+          receivers * kFloat};
+}
+
+bool LightGridPass::fits(const Sizes& sizes) const {
+  const auto held = const_cast<Buffers&>(buffers_).all();
+  std::uint64_t own = 0, bytes = 0;
+  for (std::size_t k = 0; k < sizes.size(); ++k) own += device_.bufferCost(held[k]->size()), bytes += sizes[k];
+  if (bytes > kBatchBytes) return false;
+  return arraysCost(device_, {sizes.begin(), sizes.end()}) + device_.stagingCost() <= device_.budget().room() + own;
+}
+
+void LightGridPass::makeRoom(const Sizes& sizes) {
+  const auto buffers = buffers_.all();
+  bool enough = true;
+  Sizes room{};
+  for (std::size_t k = 0; k < sizes.size(); ++k) {
+    enough = enough && sizes[k] <= buffers[k]->size();
+    room[k] = std::max<std::uint64_t>(buffers[k]->size(), sizes[k] + sizes[k] / 8);
+  }
+  if (enough) return;
+  release();
+  // More where that fits: batches differ, and so few of them make the buffers anew.
+  if (!arraysFit(device_, {room.begin(), room.end()}, device_.stagingCost())) room = sizes;
+  for (std::size_t k = 0; k < sizes.size(); ++k) *buffers[k] = device_.createBuffer(room[k]);
+  device_.upload<float>(buffers_.stored, std::vector<float>(layout::kBlockFloats, 0.0f));
+}
+
+std::vector<float> LightGridPass::run(const GridArrays& batch, std::size_t channels, layout::uint falloff,
+                                      double cell) {
+  makeRoom(sizesOf(batch));
+  const Buffers& to = buffers_;
+  device_.upload<layout::GridKernel>(to.kernels, batch.kernels);
+  device_.upload<std::uint32_t>(to.entries, batch.entries);
+  device_.upload<layout::GridBlock>(to.blocks, batch.blocks);
+  device_.upload<std::uint32_t>(to.table, batch.table);
+  device_.upload<layout::GridReceiver>(to.receivers, batch.receivers);
+  std::size_t strands = 0;
+  for (const GridArrays::Pieces& pieces : batch.pieces) {
+    device_.upload<layout::GridStrand>(to.strands, pieces.strands, strands);
+    strands += pieces.strands.size();
+  }
+  layout::GridParams params{};
+  params.kernels = to.kernels.address(), params.peaks = to.peaks.address(), params.weights = to.weights.address();
+  params.own = to.own.address(), params.entries = to.entries.address(), params.blocks = to.blocks.address();
+  params.stored = to.stored.address(), params.table = to.table.address();
+  params.receivers = to.receivers.address(), params.depths = to.depths.address();
+  params.cell = static_cast<float>(cell);
+  if (read_.handle() == VK_NULL_HANDLE)
+    read_ = device_.createComputePipeline(spirv::grid_read_comp, sizeof(layout::GridParams),
+                                          std::array<SpecializationConstant, 1>{{{0, groupSize_}}});
+  const auto eachInvocation = [&](CommandBuffer& commands, const ComputePipeline& pipeline, std::size_t count) {
+    layout::GridParams own = params;
+    own.count = static_cast<layout::uint>(count);
+    commands.dispatchRow(pipeline, own, (count + groupSize_ - 1) / groupSize_);
+  };
+  const std::size_t eachGroup = groupSize_ / device_.mostSubgroupSize(), receivers = batch.receivers.size();
+  std::vector<float> depths(channels * receivers);
+  for (std::size_t channel = 0; channel < channels; ++channel) {
+    device_.upload<float>(to.peaks, batch.peaks[channel]);
+    queries_.reset();
+    device_.run([&](CommandBuffer& commands) {
+      const std::uint32_t stage = queries_.begin(commands, "light grid");
+      eachInvocation(commands, weigh(falloff), batch.kernels.size());
+      std::uint64_t strand = to.strands.address();
+      std::uint32_t round = 0;
+      commands.barrier(barrier::computeToCompute);
+      for (const GridArrays::Pieces& pieces : batch.pieces) {
+        if (pieces.round != round) commands.barrier(barrier::computeToCompute);
+        round = pieces.round;
+        layout::GridParams own = params;
+        own.strands = strand, own.count = static_cast<layout::uint>(pieces.strands.size());
+        strand += pieces.strands.size() * sizeof(layout::GridStrand);
+        commands.dispatchRow(fill({falloff, pieces.kinds, round > 0}), own,
+                             (pieces.strands.size() + eachGroup - 1) / eachGroup);
+      }
+      commands.barrier(barrier::computeToCompute);
+      eachInvocation(commands, read_, receivers);
+      queries_.end(commands, stage);
+    });
+    for (const StageTime& stage : queries_.results()) deviceSeconds_ += stage.seconds;
+    device_.downloadBytes(to.depths, 0, depths.data() + channel * receivers, receivers * sizeof(float));
+  }
+  return depths;
+}
+
+std::vector<float> LightGridPass::opticalDepths(const Octree& tree, const Receivers& receivers,
+                                                const layout::Light& light, const LightingOptions& options,
+                                                const GridResolution& resolution, std::span<const std::uint8_t> reached,
+                                                const RaysDone& done) {
+  MOTE_CHECK(resolution.cell, >, 0.0);
+  MOTE_CHECK(resolution.bin, >, 0.0);
+  const std::size_t channels = tree.channels();
+  std::vector<float> depths(channels * receivers.size(), 0.0f);
+  if (shadowless(light) || tree.particleCount() == 0) return depths;
+  const GridShape shape = gridShape(light, resolution, options.falloff);
+  const GridPlan plan = planGrid(tree, receivers, shape, reached);
+  const float slack = columnRules(tree, light, receivers.bounds()).slack;
+  const auto itemsOf = [&](const GridPlan::Tile& tile) {
+    return plan.receivers(tile).size() + plan.particles(tile).size();
+  };
+  std::vector<Work> works;
+  GridArrays batch;
+  // A batch's depths to the receivers they belong to.
+  const auto finish = [&](std::size_t first, std::size_t last) {
+    std::vector<const GridArrays*> parts;
+    for (std::size_t w = first; w < last; ++w) parts.push_back(&works[w].blocks.arrays());
+    join(parts, channels, batch);
+    const std::vector<float> found = run(batch, channels, options.falloff, resolution.cell);
+    const std::size_t all = batch.receivers.size();
+    std::vector<std::size_t> start(last - first + 1, 0);
+    for (std::size_t w = first; w < last; ++w) start[w - first + 1] = start[w - first] + works[w].members.size();
+    parallelBlocks(last - first, 1, [&](std::size_t k, std::size_t) {
+      static thread_local std::vector<float> read;
+      const Work& work = works[first + k];
+      const std::size_t count = work.members.size();
+      read.resize(channels * count);
+      for (std::size_t c = 0; c < channels; ++c)
+        std::copy_n(found.begin() + static_cast<std::ptrdiff_t>(c * all + start[k]), count,
+                    read.begin() + static_cast<std::ptrdiff_t>(c * count));
+      addNearLight(tree, plan.nearLight, work.tile, receivers, work.members, options, slack, read);
+      for (std::size_t c = 0; c < channels; ++c)
+        for (std::size_t i = 0; i < count; ++i) depths[c * receivers.size() + work.members[i]] = read[c * count + i];
+    });
+    if (done) done(all);
+  };
+  for (std::size_t begin = 0, end = 0; begin < plan.tiles.size(); begin = end) {
+    std::size_t items = 0;
+    while (end < plan.tiles.size() && (end == begin || items + itemsOf(plan.tiles[end]) <= kMostItems))
+      items += itemsOf(plan.tiles[end++]);
+    if (works.size() < end - begin) works.resize(end - begin);
+    parallelBlocks(end - begin, 1, [&](std::size_t k, std::size_t) {
+      const GridPlan::Tile& planned = plan.tiles[begin + k];
+      Work& work = works[k];
+      work.members = plan.receivers(planned);
+      work.tile.setUp(tree, receivers, plan, planned, shape, options.falloff);
+      work.blocks.setUp(work.tile, receivers, work.members, plan.particles(planned), device_.leastSubgroupSize(),
+                        kMostSteps);
+    });
+    for (std::size_t first = 0, last = 0; first < end - begin; first = last) {
+      Sizes sizes{};
+      do {
+        const Sizes more = sizesOf(works[last].blocks.arrays());
+        for (std::size_t k = 0; k < sizes.size(); ++k) sizes[k] += more[k];
+      } while (++last < end - begin && fits(sizes));
+      finish(first, last);
+    }
+  }
+  return depths;
+}
+
+}  // namespace mote

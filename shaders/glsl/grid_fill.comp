@@ -1,0 +1,115 @@
+// Puts kernels down on the light grid and sums along the depth: one subgroup a strand, all groups of bins over 4 × 4 nodes.
+//
+// A lane takes a particle of its own to all 16 nodes and 4 bins; the 64 sums stay in its registers until the block's
+// particles are through. Then they are added up over the lanes, always in the same order, and on what the blocks before
+// left. So a particle is loaded once for 64 multiply-adds, stores are side by side, and there is no atomic nor barrier.
+//
+// On lavapipe (Mesa 22.3) a load inside of a loop takes about 90 instructions for each component of a subgroup, which is
+// why a block is that large; loops over nodes and bins must unroll, or the sums live in memory.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#extension GL_EXT_control_flow_attributes : require
+#include "lib/grid.glsl"
+
+layout(constant_id = 2) const bool kTents = true;     // there may be kernels that are tents …
+layout(constant_id = 3) const bool kEllipses = true;  // … or have a falloff on the light's plane …
+layout(constant_id = 4) const bool kCurved = true;    // … or near a point light
+layout(constant_id = 5) const bool kGoesOn = false;   // the strand's first block has sums already
+layout(constant_id = 6) const uint kStoreLanes = 4;   // at most as many as a subgroup has lanes; divides 16
+
+#include "lib/falloff.glsl"
+
+const uint kChunks = kBlockNodes / kStoreLanes;
+const uint kMostChunks = kBlockNodes;
+
+float sum[kBlockNodes * kBlockBins];  // of the lane's particles, [bin][row][column]
+float carry[kMostChunks];             // the lane's nodes of each chunk: what lies before the block
+
+float weightAt(GridKernel p, float dx, float dy, float bdy, float cdy2, vec2 uv) {
+  const float tent = kTents ? max(1.0 - abs(dx), 0.0) * max(1.0 - abs(dy), 0.0) : 0.0;
+  if (!kEllipses && !kCurved) return tent;
+  float q = (p.a * dx + bdy) * dx + cdy2;
+  if (kCurved) {
+    const float across = dx * uv.y - dy * uv.x;
+    q = p.c < 0.0 ? p.a * (dx * dx + dy * dy + across * across) / (1.0 + uv.x * uv.x + uv.y * uv.y) : q;
+  }
+  const float value = falloff(q, kFalloff);
+  return kTents && p.c == 0.0 ? tent : value;
+}
+
+/// Only what the variant needs: each component costs.
+GridKernel kernelAt(uint i) {
+  GridKernel p;
+  p.x = params.kernels.at[i].x, p.y = params.kernels.at[i].y;
+  p.depth = params.kernels.at[i].depth, p.inverseRadius = params.kernels.at[i].inverseRadius;
+  p.a = p.b = p.c = 0.0;
+  if (kEllipses || kCurved)
+    p.a = params.kernels.at[i].a, p.b = params.kernels.at[i].b, p.c = params.kernels.at[i].c;
+  return p;
+}
+
+void addParticle(GridKernel p, float weight, GridStrand strand, float bin) {
+  float share[kBlockBins];
+  float before = depthShare((bin - p.depth) * p.inverseRadius);
+  [[unroll]] for (uint k = 0; k < kBlockBins; ++k) {
+    const float after = depthShare((bin + float(k + 1) - p.depth) * p.inverseRadius);
+    share[k] = weight * (after - before);
+    before = after;
+  }
+  [[unroll]] for (uint r = 0; r < kBlockEdge; ++r) {
+    const float dy = (strand.row + float(r)) - p.y, bdy = p.b * dy, cdy2 = p.c * (dy * dy);
+    [[unroll]] for (uint c = 0; c < kBlockEdge; ++c) {
+      const float dx = (strand.column + float(c)) - p.x;
+      const vec2 uv = vec2(strand.u + float(c) * params.cell, strand.v + float(r) * params.cell);
+      const float at = weightAt(p, dx, dy, bdy, cdy2, uv);
+      [[unroll]] for (uint k = 0; k < kBlockBins; ++k) sum[(k * kBlockEdge + r) * kBlockEdge + c] += at * share[k];
+    }
+  }
+}
+
+/// The sums over the lanes, added to what lies before; the next block begins where this one ends.
+void storeBlock(uint stored, bool goesOn) {
+  const uint lane = gl_SubgroupInvocationID, to = stored * kBlockFloats + min(lane, kStoreLanes - 1);
+  [[unroll]] for (uint chunk = 0; chunk < kChunks; ++chunk) {
+    const uint node = chunk * kStoreLanes;
+    float before = carry[chunk], edge = 0.0;
+    if (kGoesOn && goesOn) before = params.stored.at[to + node];
+    if (lane < kStoreLanes) params.stored.at[to + node] = before;
+    [[unroll]] for (uint k = 0; k < kBlockBins; ++k) {
+      float total = 0.0;
+      [[unroll]] for (uint j = 0; j < kStoreLanes; ++j) {
+        const float one = subgroupAdd(sum[k * kBlockNodes + node + j]);
+        total = lane == j ? one : total;
+      }
+      edge += total;
+      const uint at = to + (k + 1) * kBlockNodes + node;
+      carry[chunk] = (kGoesOn && goesOn ? params.stored.at[at] : before) + edge;
+      if (lane < kStoreLanes) params.stored.at[at] = carry[chunk];
+    }
+  }
+}
+
+void main() {
+  const uint s = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_NumSubgroups + gl_SubgroupID;
+  if (s >= params.count) return;
+  const GridStrand strand = params.strands.at[s];
+  [[unroll]] for (uint chunk = 0; chunk < kChunks; ++chunk) carry[chunk] = 0.0;
+  uint b = strand.first;
+  do {
+    const GridBlock block = params.blocks.at[b];
+    [[unroll]] for (uint j = 0; j < kBlockNodes * kBlockBins; ++j) sum[j] = 0.0;
+    uint at = block.first + gl_SubgroupInvocationID;
+    const uint last = block.end - 1;
+    uint begin = block.first;
+    do {
+      const uint i = params.entries.at[min(at, last)];
+      const float weight = at <= last ? params.weights.at[i] : 0.0;
+      addParticle(kernelAt(i), weight, strand, block.bin);
+      at += gl_SubgroupSize, begin += gl_SubgroupSize;
+    } while (begin <= last);
+    storeBlock(block.stored, b == strand.first);
+    ++b;
+  } while (b < strand.end);
+}

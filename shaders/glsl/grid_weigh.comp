@@ -1,0 +1,55 @@
+// What a particle's weights on the light grid's nodes are multiplied with, and what it finds of itself where it stands:
+// one lane a particle, all in registers.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "lib/grid.glsl"
+
+#include "lib/falloff.glsl"
+
+float weightAt(GridKernel p, float dx, float dy) {
+  if (p.c == 0.0) return max(1.0 - abs(dx), 0.0) * max(1.0 - abs(dy), 0.0);
+  return falloff((p.a * dx + p.b * dy) * dx + p.c * (dy * dy), kFalloff);
+}
+
+float sumOfWeights(GridKernel p) {
+  // The window has all that are nearer than half its nodes to the centre.
+  const vec2 middle = floor((p.window & 1u) == 0 ? vec2(p.x, p.y) : vec2(p.x, p.y) + 0.5);
+  const vec2 at = vec2(p.x, p.y) - (middle - float((p.window - 1) / 2));
+  float sum = 0.0;
+  uint row = 0;
+  do {
+    uint column = 0;
+    do {
+      sum += weightAt(p, float(column) - at.x, float(row) - at.y);
+      ++column;
+    } while (column < p.window);
+    ++row;
+  } while (row < p.window);
+  return sum;
+}
+
+/// The share of its peak that it finds of itself, as a receiver reads: between four nodes, and between the edges of a
+/// bin.
+float ownShare(GridKernel p, float scale) {
+  const vec2 below = floor(vec2(p.x, p.y)), into = vec2(p.x, p.y) - below;
+  const float lower = between(weightAt(p, -into.x, -into.y), weightAt(p, 1.0 - into.x, -into.y), into.x);
+  const float upper = between(weightAt(p, -into.x, 1.0 - into.y), weightAt(p, 1.0 - into.x, 1.0 - into.y), into.x);
+  const float bin = floor(p.place);
+  const float before = depthShare((bin - p.depth) * p.inverseRadius);
+  const float after = depthShare((bin + 1.0 - p.depth) * p.inverseRadius);
+  return scale * between(lower, upper, into.y) * between(before, after, p.place - bin);
+}
+
+void main() {
+  const uint i = invocationOfDispatch();
+  if (i >= params.count) return;
+  const GridKernel p = params.kernels.at[i];
+  const float peak = params.peaks.at[i];
+  float scale = p.mass, own = p.place;
+  if (p.window != 0) {
+    scale = p.mass / sumOfWeights(p);
+    own = ownShare(p, scale);
+  }
+  params.weights.at[i] = scale * peak;
+  params.own.at[i] = own * peak;
+}
