@@ -69,7 +69,7 @@ void GridBlocks::setKernels(const GridTile& tile) {
     layout::GridKernel& kernel = arrays_.kernels[i] = {};
     const int window = windowOf(p, i);
     if (window == 0) continue;
-    const float x = p.points.x[i], y = p.points.y[i], half = p.half[i] + kSlack;
+    const float x = p.points.x[i], y = p.points.y[i], half = std::max(p.half[i], 1.0f) + kSlack;  // of a tent: 1
     kernel = {x,
               y,
               p.a[i],
@@ -79,7 +79,7 @@ void GridBlocks::setKernels(const GridTile& tile) {
               1.0f / p.depthRadius[i],
               p.points.depth[i],
               p.mass[i],
-              window == 2 ? 2u : static_cast<layout::uint>(window)};
+              static_cast<layout::uint>(window)};
     Nodes columns(x - half, x + half), rows(y - half, y + half);
     std::uint32_t kind = window == 2 ? kTentKernels : kEllipseKernels;
     if (window == kAlone) {
