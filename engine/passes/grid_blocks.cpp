@@ -13,6 +13,10 @@ constexpr std::size_t kBlocks = layout::kTileBlocks * layout::kTileBlocks;
 static_assert(kTileCells + 1 <= kEdge * static_cast<int>(layout::kTileBlocks));
 static_assert(kGroupBins == layout::kBlockBins);
 
+/// The widest kernel that the device weighs [nodes]: lanes wait for the widest of their neighbours, and a shader may
+/// not loop for long.
+constexpr int kWidest = 64;
+
 /// Nodes: the device may round in another way than what says which a kernel covers.
 constexpr float kSlack = 1e-3f;
 
@@ -27,6 +31,13 @@ struct Nodes {
 
 /// Group by number among those that the tile has; < 0: left out.
 int numberOf(const GridTile& tile, int group) { return tile.placeOfGroup(group) / kGroupBins - 1; }
+
+/// How far from its centre a kernel has nodes: 1 for a tent, and of the two half widths of an ellipse the greater.
+float halfOf(const GridParticles& p, std::size_t i, int window) {
+  if (window == 2) return 1;
+  if (window != kAlone) return p.half[i];
+  return std::sqrt(std::max(p.a[i], p.c[i]) / (p.a[i] * p.c[i] - 0.25f * (p.b[i] * p.b[i])));
+}
 
 }  // namespace
 
@@ -69,29 +80,33 @@ void GridBlocks::setKernels(const GridTile& tile) {
     layout::GridKernel& kernel = arrays_.kernels[i] = {};
     const int window = windowOf(p, i);
     if (window == 0) continue;
-    const float x = p.points.x[i], y = p.points.y[i], half = std::max(p.half[i], 1.0f) + kSlack;  // of a tent: 1
-    kernel = {x,
-              y,
-              p.a[i],
-              p.b[i],
-              p.c[i],
-              p.depth[i],
-              1.0f / p.depthRadius[i],
-              p.points.depth[i],
-              p.mass[i],
-              static_cast<layout::uint>(window)};
+    const float x = p.points.x[i], y = p.points.y[i];
+    kernel = {.x = x,
+              .y = y,
+              .depth = p.depth[i],
+              .inverseRadius = 1.0f / p.depthRadius[i],
+              .a = p.a[i],
+              .b = p.b[i],
+              .c = p.c[i],
+              .weight = 0,
+              .place = p.points.depth[i],
+              .mass = p.mass[i],
+              .window = 0,
+              .own = 0};
+    const float half = halfOf(p, i, window) + kSlack;
     Nodes columns(x - half, x + half), rows(y - half, y + half);
     std::uint32_t kind = window == 2 ? kTentKernels : kEllipseKernels;
-    if (window == kAlone) {
+    if (window == 2) kernel.c = 0;
+    if (p.curved[i] > 0 || 2 * half > kWidest) {
       const LoneKernel lone = weighAlone(tile, i);
-      kernel.window = 0, kernel.mass = lone.scale, kernel.place = lone.own;
+      kernel.mass = lone.scale, kernel.place = lone.own;
       if (!(lone.scale > 0)) continue;
       const auto column = static_cast<float>(lone.firstColumn), row = static_cast<float>(lone.firstRow);
       columns = Nodes(column, column + static_cast<float>(lone.columns - 1));
       rows = Nodes(row, row + static_cast<float>(lone.rows - 1));
       if (p.curved[i] > 0) kind = kCurvedKernels, kernel.a = p.curved[i] * (cell * cell), kernel.b = 0, kernel.c = -1;
-    } else if (window == 2) {
-      kernel.c = 0;
+    } else {
+      kernel.window = window == 2 ? 2 : static_cast<layout::uint>(std::ceil(2 * half));
     }
     const int first = numberOf(tile, p.firstBin[i] >> 2);
     if (first < 0 || columns.empty() || rows.empty()) continue;

@@ -20,13 +20,6 @@ constexpr std::uint32_t kMostSteps = 60000;
 
 }  // namespace
 
-/// A tile that is set up, or on its way through the device.
-struct LightGridPass::Work {
-  GridTile tile;
-  GridBlocks blocks;
-  std::span<const std::uint32_t> members;
-};
-
 LightGridPass::LightGridPass(const Device& device)
     : device_(device),
       queries_(device.createTimestampQueries(1)),
@@ -61,12 +54,10 @@ LightGridPass::Sizes LightGridPass::sizesOf(const GridArrays& a) const {
   const std::uint64_t kernels = a.kernels.size(), receivers = a.receivers.size();
   return {kernels * sizeof(layout::GridKernel),
           kernels * kFloat,
-          kernels * kFloat,
-          kernels * kFloat,
           a.entries.size() * kUint,
           a.blocks.size() * sizeof(layout::GridBlock),
           a.strands() * sizeof(layout::GridStrand),
-          (1 + std::uint64_t{a.storedBlocks}) * layout::kBlockFloats * kFloat,
+          (1 + std::uint64_t{a.storedBlocks}) * layout::kBlockPairs * sizeof(layout::GridPair),
           a.table.size() * kUint,
           receivers * sizeof(layout::GridReceiver),
           receivers * kFloat};
@@ -89,11 +80,11 @@ void LightGridPass::makeRoom(const Sizes& sizes) {
     room[k] = std::max<std::uint64_t>(buffers[k]->size(), sizes[k] + sizes[k] / 8);
   }
   if (enough) return;
-  release();
+  buffers_ = {};
   // More where that fits: batches differ, and so few of them make the buffers anew.
   if (!arraysFit(device_, {room.begin(), room.end()}, device_.stagingCost())) room = sizes;
   for (std::size_t k = 0; k < sizes.size(); ++k) *buffers[k] = device_.createBuffer(room[k]);
-  device_.upload<float>(buffers_.stored, std::vector<float>(layout::kBlockFloats, 0.0f));
+  device_.upload<layout::GridPair>(buffers_.stored, std::vector<layout::GridPair>(layout::kBlockPairs));
 }
 
 std::vector<float> LightGridPass::run(const GridArrays& batch, std::size_t channels, layout::uint falloff,
@@ -111,8 +102,8 @@ std::vector<float> LightGridPass::run(const GridArrays& batch, std::size_t chann
     strands += pieces.strands.size();
   }
   layout::GridParams params{};
-  params.kernels = to.kernels.address(), params.peaks = to.peaks.address(), params.weights = to.weights.address();
-  params.own = to.own.address(), params.entries = to.entries.address(), params.blocks = to.blocks.address();
+  params.kernels = to.kernels.address(), params.peaks = to.peaks.address();
+  params.entries = to.entries.address(), params.blocks = to.blocks.address();
   params.stored = to.stored.address(), params.table = to.table.address();
   params.receivers = to.receivers.address(), params.depths = to.depths.address();
   params.cell = static_cast<float>(cell);
@@ -169,28 +160,28 @@ std::vector<float> LightGridPass::opticalDepths(const Octree& tree, const Receiv
   const auto itemsOf = [&](const GridPlan::Tile& tile) {
     return plan.receivers(tile).size() + plan.particles(tile).size();
   };
-  std::vector<Work> works;
-  GridArrays batch;
   // A batch's depths to the receivers they belong to.
   const auto finish = [&](std::size_t first, std::size_t last) {
     std::vector<const GridArrays*> parts;
-    for (std::size_t w = first; w < last; ++w) parts.push_back(&works[w].blocks.arrays());
-    join(parts, channels, batch);
-    const std::vector<float> found = run(batch, channels, options.falloff, resolution.cell);
-    const std::size_t all = batch.receivers.size();
+    for (std::size_t w = first; w < last; ++w) parts.push_back(&works_[w].blocks.arrays());
+    join(parts, channels, batch_);
+    const std::vector<float> found = run(batch_, channels, options.falloff, resolution.cell);
+    const std::size_t all = batch_.receivers.size();
     std::vector<std::size_t> start(last - first + 1, 0);
-    for (std::size_t w = first; w < last; ++w) start[w - first + 1] = start[w - first] + works[w].members.size();
+    for (std::size_t w = first; w < last; ++w)
+      start[w - first + 1] = start[w - first] + works_[w].blocks.arrays().receivers.size();
     parallelBlocks(last - first, 1, [&](std::size_t k, std::size_t) {
       static thread_local std::vector<float> read;
-      const Work& work = works[first + k];
-      const std::size_t count = work.members.size();
+      const Work& work = works_[first + k];
+      const std::span<const std::uint32_t> members = plan.receivers(*work.planned);
+      const std::size_t count = members.size();
       read.resize(channels * count);
       for (std::size_t c = 0; c < channels; ++c)
         std::copy_n(found.begin() + static_cast<std::ptrdiff_t>(c * all + start[k]), count,
                     read.begin() + static_cast<std::ptrdiff_t>(c * count));
-      addNearLight(tree, plan.nearLight, work.tile, receivers, work.members, options, slack, read);
+      addNearLight(tree, plan.nearLight, shape, work.planned->place, receivers, members, options, slack, read);
       for (std::size_t c = 0; c < channels; ++c)
-        for (std::size_t i = 0; i < count; ++i) depths[c * receivers.size() + work.members[i]] = read[c * count + i];
+        for (std::size_t i = 0; i < count; ++i) depths[c * receivers.size() + members[i]] = read[c * count + i];
     });
     if (done) done(all);
   };
@@ -198,19 +189,19 @@ std::vector<float> LightGridPass::opticalDepths(const Octree& tree, const Receiv
     std::size_t items = 0;
     while (end < plan.tiles.size() && (end == begin || items + itemsOf(plan.tiles[end]) <= kMostItems))
       items += itemsOf(plan.tiles[end++]);
-    if (works.size() < end - begin) works.resize(end - begin);
+    if (works_.size() < end - begin) works_.resize(end - begin);
     parallelBlocks(end - begin, 1, [&](std::size_t k, std::size_t) {
       const GridPlan::Tile& planned = plan.tiles[begin + k];
-      Work& work = works[k];
-      work.members = plan.receivers(planned);
-      work.tile.setUp(tree, receivers, plan, planned, shape, options.falloff);
-      work.blocks.setUp(work.tile, receivers, work.members, plan.particles(planned), device_.leastSubgroupSize(),
-                        kMostSteps);
+      static thread_local GridTile tile;
+      tile.setUp(tree, receivers, plan, planned, shape, options.falloff);
+      works_[k].planned = &planned;
+      works_[k].blocks.setUp(tile, receivers, plan.receivers(planned), plan.particles(planned),
+                             device_.leastSubgroupSize(), kMostSteps);
     });
     for (std::size_t first = 0, last = 0; first < end - begin; first = last) {
       Sizes sizes{};
       do {
-        const Sizes more = sizesOf(works[last].blocks.arrays());
+        const Sizes more = sizesOf(works_[last].blocks.arrays());
         for (std::size_t k = 0; k < sizes.size(); ++k) sizes[k] += more[k];
       } while (++last < end - begin && fits(sizes));
       finish(first, last);

@@ -34,8 +34,8 @@ class LightGridPass {
 
   /// Device seconds of all opticalDepths calls so far, from timestamps.
   double deviceSeconds() const { return deviceSeconds_; }
-  /// Gives back to the device's budget what the last opticalDepths needed; the next takes it again.
-  void release() { buffers_ = {}; }
+  /// Gives back to the device's budget, and to the host, what the last opticalDepths needed; the next takes it again.
+  void release() { buffers_ = {}, works_ = {}, batch_ = {}; }
 
  private:
   struct FillVariant {
@@ -45,15 +45,18 @@ class LightGridPass {
     auto operator<=>(const FillVariant&) const = default;
   };
   struct Buffers {
-    Buffer kernels, peaks, weights, own, entries, blocks, strands, stored, table, receivers, depths;
+    Buffer kernels, peaks, entries, blocks, strands, stored, table, receivers, depths;
     auto all() {
-      return std::array{&kernels, &peaks,  &weights, &own,       &entries, &blocks,
-                        &strands, &stored, &table,   &receivers, &depths};
+      return std::array{&kernels, &peaks, &entries, &blocks, &strands, &stored, &table, &receivers, &depths};
     }
   };
   /// Bytes of each, in that order.
-  using Sizes = std::array<std::uint64_t, 11>;
-  struct Work;
+  using Sizes = std::array<std::uint64_t, 9>;
+  /// A tile that is set up.
+  struct Work {
+    const GridPlan::Tile* planned;
+    GridBlocks blocks;
+  };
 
   const ComputePipeline& fill(const FillVariant& variant);
   const ComputePipeline& weigh(layout::uint falloff);
@@ -70,6 +73,8 @@ class LightGridPass {
   std::map<FillVariant, ComputePipeline> fills_;
   ComputePipeline read_;
   Buffers buffers_;
+  std::vector<Work> works_;
+  GridArrays batch_;
   double deviceSeconds_ = 0;
 };
 

@@ -44,26 +44,28 @@ void addOne(const Octree& tree, std::uint32_t slot, const dvec3& light, const Re
 }
 
 /// Planes around the rays of a tile's receivers.
-ColumnPlanes planesOf(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
-                      float slack) {
+ColumnPlanes planesOf(const GridShape& shape, const TilePlace& place, const Receivers& receivers,
+                      std::span<const std::uint32_t> members, float slack) {
+  const LightFrame& frame = shape.faces[place.face];
   double deepest = 0;
   for (const std::uint32_t k : members)
-    deepest = std::max(deepest, glm::distance(dvec3(receivers.position(k)), tile.frame.origin));
-  const double cell = tile.shape->resolution.cell;
-  const dvec2 corner(tile.firstColumn, tile.firstRow), end = corner + double(tile.shape->tileCells);
-  return planesAround(tile.frame, corner * cell, end * cell, deepest, slack);
+    deepest = std::max(deepest, glm::distance(dvec3(receivers.position(k)), frame.origin));
+  const dvec2 corner = dvec2(place.column, place.row) * double(shape.tileCells);
+  const dvec2 end = corner + double(shape.tileCells);
+  return planesAround(frame, corner * shape.resolution.cell, end * shape.resolution.cell, deepest, slack);
 }
 
 }  // namespace
 
-void addNearLight(const Octree& tree, std::span<const std::uint32_t> nearLight, const GridTile& tile,
-                  const Receivers& receivers, std::span<const std::uint32_t> members, const LightingOptions& options,
-                  float slack, std::vector<float>& depths) {
+void addNearLight(const Octree& tree, std::span<const std::uint32_t> nearLight, const GridShape& shape,
+                  const TilePlace& place, const Receivers& receivers, std::span<const std::uint32_t> members,
+                  const LightingOptions& options, float slack, std::vector<float>& depths) {
   if (nearLight.empty()) return;
-  const ColumnPlanes planes = planesOf(tile, receivers, members, slack);
+  const ColumnPlanes planes = planesOf(shape, place, receivers, members, slack);
+  const dvec3 light = shape.faces[place.face].origin;
   for (const std::uint32_t slot : nearLight)
     if (touches(planes, tree.position(slot), tree.radius[slot]))
-      addOne(tree, slot, tile.frame.origin, receivers, members, options, depths);
+      addOne(tree, slot, light, receivers, members, options, depths);
 }
 
 }  // namespace mote

@@ -53,7 +53,7 @@ std::vector<float> gridOpticalDepths(const Octree& tree, const Receivers& receiv
     fillTile(tile);
     readTile(tile, read);
     removeOwn(tile, receivers, members, slots, read);
-    addNearLight(tree, plan.nearLight, tile, receivers, members, options, slack, read);
+    addNearLight(tree, plan.nearLight, shape, plan.tiles[t].place, receivers, members, options, slack, read);
     for (std::size_t c = 0; c < channels; ++c)
       for (std::size_t k = 0; k < members.size(); ++k)
         depths[c * receivers.size() + members[k]] = read[c * members.size() + k];

@@ -39,23 +39,21 @@ float weightAt(GridKernel p, float dx, float dy, float bdy, float cdy2, vec2 uv)
   return kTents && p.c == 0.0 ? tent : value;
 }
 
-/// Only what the variant needs: each component costs.
+/// Only what the variant needs: each load costs.
 GridKernel kernelAt(uint i) {
-  GridKernel p;
-  p.x = params.kernels.at[i].x, p.y = params.kernels.at[i].y;
-  p.depth = params.kernels.at[i].depth, p.inverseRadius = params.kernels.at[i].inverseRadius;
-  p.a = p.b = p.c = 0.0;
-  if (kEllipses || kCurved)
-    p.a = params.kernels.at[i].a, p.b = params.kernels.at[i].b, p.c = params.kernels.at[i].c;
-  return p;
+  WordPairBuffer words = WordPairBuffer(params.kernels);
+  const uint first = i * kKernelPairs;
+  const vec2 xy = loadFloats(words, first), along = loadFloats(words, first + 1), c = loadFloats(words, first + 3);
+  const vec2 ab = kEllipses || kCurved ? loadFloats(words, first + 2) : vec2(0);
+  return GridKernel(xy.x, xy.y, along.x, along.y, ab.x, ab.y, c.x, c.y, 0.0, 0.0, 0, 0.0);
 }
 
-void addParticle(GridKernel p, float weight, GridStrand strand, float bin) {
+void addParticle(GridKernel p, GridStrand strand, float bin) {
   float share[kBlockBins];
   float before = depthShare((bin - p.depth) * p.inverseRadius);
   [[unroll]] for (uint k = 0; k < kBlockBins; ++k) {
     const float after = depthShare((bin + float(k + 1) - p.depth) * p.inverseRadius);
-    share[k] = weight * (after - before);
+    share[k] = p.weight * (after - before);
     before = after;
   }
   [[unroll]] for (uint r = 0; r < kBlockEdge; ++r) {
@@ -71,22 +69,24 @@ void addParticle(GridKernel p, float weight, GridStrand strand, float bin) {
 
 /// The sums over the lanes, added to what lies before; the next block begins where this one ends.
 void storeBlock(uint stored, bool goesOn) {
-  const uint lane = gl_SubgroupInvocationID, to = stored * kBlockFloats + min(lane, kStoreLanes - 1);
+  WordPairBuffer words = WordPairBuffer(params.stored);
+  const uint lane = gl_SubgroupInvocationID, to = stored * kBlockPairs + min(lane, kStoreLanes - 1);
   [[unroll]] for (uint chunk = 0; chunk < kChunks; ++chunk) {
-    const uint node = chunk * kStoreLanes;
-    float before = carry[chunk], edge = 0.0;
-    if (kGoesOn && goesOn) before = params.stored.at[to + node];
-    if (lane < kStoreLanes) params.stored.at[to + node] = before;
+    float sums = 0.0;
     [[unroll]] for (uint k = 0; k < kBlockBins; ++k) {
+      const uint node = k * kBlockNodes + chunk * kStoreLanes;
+      vec2 edges = vec2(carry[chunk]);
+      if (kGoesOn && goesOn) edges = loadFloats(words, to + node);
+      edges.x += sums;
       float total = 0.0;
       [[unroll]] for (uint j = 0; j < kStoreLanes; ++j) {
-        const float one = subgroupAdd(sum[k * kBlockNodes + node + j]);
+        const float one = subgroupAdd(sum[node + j]);
         total = lane == j ? one : total;
       }
-      edge += total;
-      const uint at = to + (k + 1) * kBlockNodes + node;
-      carry[chunk] = (kGoesOn && goesOn ? params.stored.at[at] : before) + edge;
-      if (lane < kStoreLanes) params.stored.at[at] = carry[chunk];
+      sums += total;
+      edges.y += sums;
+      if (lane < kStoreLanes) words.at[to + node] = pack64(floatBitsToUint(edges));
+      if (k == kBlockBins - 1) carry[chunk] = edges.y;
     }
   }
 }
@@ -105,8 +105,9 @@ void main() {
     uint begin = block.first;
     do {
       const uint i = params.entries.at[min(at, last)];
-      const float weight = at <= last ? params.weights.at[i] : 0.0;
-      addParticle(kernelAt(i), weight, strand, block.bin);
+      GridKernel kernel = kernelAt(i);
+      kernel.weight = at <= last ? kernel.weight : 0.0;
+      addParticle(kernel, strand, block.bin);
       at += gl_SubgroupSize, begin += gl_SubgroupSize;
     } while (begin <= last);
     storeBlock(block.stored, b == strand.first);

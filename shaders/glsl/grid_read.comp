@@ -10,21 +10,25 @@ const uint kNone = 0xffffffffu;
 void main() {
   const uint k = invocationOfDispatch();
   if (k >= params.count) return;
-  const GridReceiver r = params.receivers.at[k];
-  const vec2 below = clamp(floor(vec2(r.x, r.y)), 0.0, float(kBlockEdge * (kTileBlocks - 1) - 1));
-  const vec2 into = vec2(r.x, r.y) - below;
-  float before[4], after[4];
+  WordPairBuffer words = WordPairBuffer(params.receivers), stored = WordPairBuffer(params.stored);
+  const uint first = k * kReceiverPairs;
+  const vec2 xy = loadFloats(words, first);
+  const uvec2 depthBin = loadPair(words, first + 1), tableSelf = loadPair(words, first + 2);
+  const float intoBin = uintBitsToFloat(depthBin.x);
+  const uint bin = depthBin.y, table = tableSelf.x, self = tableSelf.y;
+  const vec2 below = clamp(floor(xy), 0.0, float(kBlockEdge * (kTileBlocks - 1) - 1)), into = xy - below;
+  vec2 edges[4];
   [[unroll]] for (uint corner = 0; corner < 4; ++corner) {
     const uint column = uint(below.x) + (corner & 1u), row = uint(below.y) + (corner >> 1);
-    const uint entry = params.table.at[r.table + row / kBlockEdge * kTileBlocks + column / kBlockEdge];
-    const uint node = (entry >> 1) * kBlockFloats + row % kBlockEdge * kBlockEdge + column % kBlockEdge;
-    const bool here = (entry & 1u) != 0;  // else all edges are the last of what lies before
-    before[corner] = params.stored.at[node + (here ? r.bin : kBlockBins) * kBlockNodes];
-    after[corner] = params.stored.at[node + (here ? r.bin + 1 : kBlockBins) * kBlockNodes];
+    const uint entry = params.table.at[table + row / kBlockEdge * kTileBlocks + column / kBlockEdge];
+    const bool here = (entry & 1u) != 0;  // else all lies before: the last edge of the block that it names
+    const uint node = (here ? bin : kBlockBins - 1) * kBlockNodes + row % kBlockEdge * kBlockEdge + column % kBlockEdge;
+    edges[corner] = loadFloats(stored, (entry >> 1) * kBlockPairs + node);
+    edges[corner].x = here ? edges[corner].x : edges[corner].y;
   }
-  const float near = between(between(before[0], before[1], into.x), between(before[2], before[3], into.x), into.y);
-  const float far = between(between(after[0], after[1], into.x), between(after[2], after[3], into.x), into.y);
-  const float own = r.self == kNone ? 0.0 : params.own.at[r.self];
-  const float depth = between(near, far, r.into);
-  params.depths.at[k] = r.self == kNone ? depth : max(depth - own, 0.0);
+  const vec2 upper = edges[0] + into.x * (edges[1] - edges[0]), lower = edges[2] + into.x * (edges[3] - edges[2]);
+  const vec2 both = upper + into.y * (lower - upper);
+  const float depth = between(both.x, both.y, intoBin);
+  const float own = params.kernels.at[self == kNone ? 0 : self].own;
+  params.depths.at[k] = self == kNone ? depth : max(depth - own, 0.0);
 }

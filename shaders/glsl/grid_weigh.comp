@@ -43,13 +43,18 @@ float ownShare(GridKernel p, float scale) {
 void main() {
   const uint i = invocationOfDispatch();
   if (i >= params.count) return;
-  const GridKernel p = params.kernels.at[i];
+  WordPairBuffer words = WordPairBuffer(params.kernels);
+  const uint first = i * kKernelPairs;
+  const vec2 xy = loadFloats(words, first), along = loadFloats(words, first + 1), ab = loadFloats(words, first + 2),
+             c = loadFloats(words, first + 3), placeMass = loadFloats(words, first + 4);
+  const GridKernel p = GridKernel(xy.x, xy.y, along.x, along.y, ab.x, ab.y, c.x, 0.0, placeMass.x, placeMass.y,
+                                  params.kernels.at[i].window, 0.0);
   const float peak = params.peaks.at[i];
   float scale = p.mass, own = p.place;
   if (p.window != 0) {
     scale = p.mass / sumOfWeights(p);
     own = ownShare(p, scale);
   }
-  params.weights.at[i] = scale * peak;
-  params.own.at[i] = own * peak;
+  params.kernels.at[i].weight = scale * peak;
+  params.kernels.at[i].own = own * peak;
 }

@@ -1,7 +1,7 @@
 // The light grid on the device (engine/passes/light_grid_pass.h): what the grid_*.comp read and write.
 //
-// Nodes of a tile go in blocks of 4 × 4, bins of depth in groups of 4. A stored block has the optical depths at the five
-// edges of a group's bins for 16 nodes, [edge][row][column]; those of a tile's 4 × 4 nodes that any particle touches
+// Nodes of a tile go in blocks of 4 × 4, bins of depth in groups of 4. A stored block has the optical depths at both edges
+// of each of a group's bins for 16 nodes, [bin][row][column]; those of a tile's 4 × 4 nodes that any particle touches
 // stand one behind the other, by depth. Block 0 is all zeros: what lies before everything.
 #ifndef MOTE_LAYOUT_GRID_H
 #define MOTE_LAYOUT_GRID_H
@@ -11,35 +11,40 @@ MOTE_LAYOUT_BEGIN
 MOTE_CONST uint kBlockEdge = 4u;   // nodes along a block's edge
 MOTE_CONST uint kBlockNodes = 16u;
 MOTE_CONST uint kBlockBins = 4u;
-MOTE_CONST uint kBlockFloats = 80u;  // nodes · (bins + 1)
+MOTE_CONST uint kBlockPairs = 64u;
 MOTE_CONST uint kTileBlocks = 17u;   // along the edge of a tile of 65 nodes
 
 // A particle's kernel: q = a·Δx² + b·Δx·Δy + c·Δy² in nodes. Where c is 0 it is a tent over a cell. Where it is −1 the
-// light is near, and q = a · (Δx² + Δy² + (Δx·v − Δy·u)²) / n with (u, v) of the node, n = 1 + u² + v².
+// light is near, and q = a · (Δx² + Δy² + (Δx·v − Δy·u)²) / n with (u, v) of the node, n = 1 + u² + v². Shaders load its
+// members in pairs.
 struct GridKernel {
   float x;              // [nodes from the tile's corner]
   float y;
+  float depth;          // of the middle [bins from the tile's base]
+  float inverseRadius;  // [1 / bins]
   float a;
   float b;
   float c;
-  float depth;          // of the middle [bins from the tile's base]
-  float inverseRadius;  // [1 / bins]
+  float weight;         // out of grid_weigh.comp: factor on F of every node
   float place;          // depth of the centre, where the particle as a receiver stands [bins]; window 0: see there
-  float mass;           // what the weights of all nodes are to add up to; window 0: the factor of the weights
-  uint window;          // nodes across that may have weight; 0: the host has weighed it, `place` is what it finds of itself
+  float mass;           // what the weights of all nodes are to add up to; window 0: the factor for a peak of 1
+  uint window;          // nodes across that may have weight; 0: the host has weighed it, `place` is its share of itself
+  float own;            // out of grid_weigh.comp: optical depth that the particle finds of itself
 };
 MOTE_BUFFER(GridKernelBuffer, GridKernel)
 MOTE_ASSERT_OFFSET(GridKernel, x, 0);
 MOTE_ASSERT_OFFSET(GridKernel, y, 4);
-MOTE_ASSERT_OFFSET(GridKernel, a, 8);
-MOTE_ASSERT_OFFSET(GridKernel, b, 12);
-MOTE_ASSERT_OFFSET(GridKernel, c, 16);
-MOTE_ASSERT_OFFSET(GridKernel, depth, 20);
-MOTE_ASSERT_OFFSET(GridKernel, inverseRadius, 24);
-MOTE_ASSERT_OFFSET(GridKernel, place, 28);
-MOTE_ASSERT_OFFSET(GridKernel, mass, 32);
-MOTE_ASSERT_OFFSET(GridKernel, window, 36);
-MOTE_ASSERT_SIZE(GridKernel, 40);
+MOTE_ASSERT_OFFSET(GridKernel, depth, 8);
+MOTE_ASSERT_OFFSET(GridKernel, inverseRadius, 12);
+MOTE_ASSERT_OFFSET(GridKernel, a, 16);
+MOTE_ASSERT_OFFSET(GridKernel, b, 20);
+MOTE_ASSERT_OFFSET(GridKernel, c, 24);
+MOTE_ASSERT_OFFSET(GridKernel, weight, 28);
+MOTE_ASSERT_OFFSET(GridKernel, place, 32);
+MOTE_ASSERT_OFFSET(GridKernel, mass, 36);
+MOTE_ASSERT_OFFSET(GridKernel, window, 40);
+MOTE_ASSERT_OFFSET(GridKernel, own, 44);
+MOTE_ASSERT_SIZE(GridKernel, 48);
 
 // The particles of one group of bins on 4 × 4 nodes.
 struct GridBlock {
@@ -73,6 +78,16 @@ MOTE_ASSERT_OFFSET(GridStrand, u, 16);
 MOTE_ASSERT_OFFSET(GridStrand, v, 20);
 MOTE_ASSERT_SIZE(GridStrand, 24);
 
+// Both edges of a bin on a node's ray: what lies before them.
+struct GridPair {
+  float before;
+  float after;
+};
+MOTE_BUFFER(GridPairBuffer, GridPair)
+MOTE_ASSERT_OFFSET(GridPair, before, 0);
+MOTE_ASSERT_OFFSET(GridPair, after, 4);
+MOTE_ASSERT_SIZE(GridPair, 8);
+
 struct GridReceiver {
   float x;     // [nodes from the tile's corner]
   float y;
@@ -94,12 +109,10 @@ MOTE_ASSERT_SIZE(GridReceiver, 24);
 struct GridParams {
   MOTE_ADDRESS(GridKernelBuffer) kernels;
   MOTE_ADDRESS(FloatBuffer) peaks;       // of the kernels: optical depth through the centre
-  MOTE_ADDRESS(FloatBuffer) weights;     // of the kernels: factor of the weights
-  MOTE_ADDRESS(FloatBuffer) own;         // of the kernels: optical depth that each finds of itself
   MOTE_ADDRESS(UintBuffer) entries;      // numbers of kernels, block after block
   MOTE_ADDRESS(GridBlockBuffer) blocks;
   MOTE_ADDRESS(GridStrandBuffer) strands;
-  MOTE_ADDRESS(FloatBuffer) stored;      // kBlockFloats a block
+  MOTE_ADDRESS(GridPairBuffer) stored;   // kBlockPairs a block
   MOTE_ADDRESS(UintBuffer) table;        // [group][block of the tile]: 2 · stored block, + 1 where it is of the group, else of one before
   MOTE_ADDRESS(GridReceiverBuffer) receivers;
   MOTE_ADDRESS(FloatBuffer) depths;      // out, of the receivers
@@ -108,18 +121,16 @@ struct GridParams {
 };
 MOTE_ASSERT_OFFSET(GridParams, kernels, 0);
 MOTE_ASSERT_OFFSET(GridParams, peaks, 8);
-MOTE_ASSERT_OFFSET(GridParams, weights, 16);
-MOTE_ASSERT_OFFSET(GridParams, own, 24);
-MOTE_ASSERT_OFFSET(GridParams, entries, 32);
-MOTE_ASSERT_OFFSET(GridParams, blocks, 40);
-MOTE_ASSERT_OFFSET(GridParams, strands, 48);
-MOTE_ASSERT_OFFSET(GridParams, stored, 56);
-MOTE_ASSERT_OFFSET(GridParams, table, 64);
-MOTE_ASSERT_OFFSET(GridParams, receivers, 72);
-MOTE_ASSERT_OFFSET(GridParams, depths, 80);
-MOTE_ASSERT_OFFSET(GridParams, count, 88);
-MOTE_ASSERT_OFFSET(GridParams, cell, 92);
-MOTE_ASSERT_SIZE(GridParams, 96);
+MOTE_ASSERT_OFFSET(GridParams, entries, 16);
+MOTE_ASSERT_OFFSET(GridParams, blocks, 24);
+MOTE_ASSERT_OFFSET(GridParams, strands, 32);
+MOTE_ASSERT_OFFSET(GridParams, stored, 40);
+MOTE_ASSERT_OFFSET(GridParams, table, 48);
+MOTE_ASSERT_OFFSET(GridParams, receivers, 56);
+MOTE_ASSERT_OFFSET(GridParams, depths, 64);
+MOTE_ASSERT_OFFSET(GridParams, count, 72);
+MOTE_ASSERT_OFFSET(GridParams, cell, 76);
+MOTE_ASSERT_SIZE(GridParams, 80);
 MOTE_LAYOUT_END
 
 #endif
