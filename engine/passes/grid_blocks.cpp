@@ -8,9 +8,8 @@
 namespace mote {
 namespace {
 
-constexpr int kEdge = static_cast<int>(layout::kBlockEdge);
 constexpr std::size_t kBlocks = layout::kTileBlocks * layout::kTileBlocks;
-static_assert(kTileCells + 1 <= kEdge * static_cast<int>(layout::kTileBlocks));
+static_assert(kTileCells + 1 <= layout::kBlockEdge * layout::kTileBlocks);
 static_assert(kGroupBins == layout::kBlockBins);
 
 /// The widest kernel that the device weighs [nodes]: lanes wait for the widest of their neighbours, and a shader may
@@ -25,8 +24,8 @@ struct Nodes {
   float lo, hi;
   Nodes(float from, float to) : lo(std::max(std::ceil(from), 0.0f)), hi(std::min(std::floor(to), float{kTileCells})) {}
   bool empty() const { return !(lo <= hi); }
-  std::uint8_t firstBlock() const { return static_cast<std::uint8_t>(static_cast<int>(lo) / kEdge); }
-  std::uint8_t lastBlock() const { return static_cast<std::uint8_t>(static_cast<int>(hi) / kEdge); }
+  std::uint32_t firstBlock() const { return static_cast<std::uint32_t>(lo) / layout::kBlockEdge; }
+  std::uint32_t lastBlock() const { return static_cast<std::uint32_t>(hi) / layout::kBlockEdge; }
 };
 
 /// Group by number among those that the tile has; < 0: left out.
@@ -39,16 +38,16 @@ float halfOf(const GridParticles& p, std::size_t i, int window) {
   return std::sqrt(std::max(p.a[i], p.c[i]) / (p.a[i] * p.c[i] - 0.25f * (p.b[i] * p.b[i])));
 }
 
-}  // namespace
-
-GridArrays::Pieces& GridArrays::piecesOf(std::uint32_t round, std::uint32_t kinds) {
-  const auto before = [](const Pieces& a, const std::pair<std::uint32_t, std::uint32_t>& b) {
+GridArrays::Pieces& piecesOf(std::vector<GridArrays::Pieces>& all, std::uint32_t round, std::uint32_t kinds) {
+  const auto before = [](const GridArrays::Pieces& a, const std::pair<std::uint32_t, std::uint32_t>& b) {
     return std::pair(a.round, a.kinds) < b;
   };
-  const auto at = std::lower_bound(pieces.begin(), pieces.end(), std::pair(round, kinds), before);
-  if (at != pieces.end() && at->round == round && at->kinds == kinds) return *at;
-  return *pieces.insert(at, {round, kinds, {}});
+  const auto at = std::lower_bound(all.begin(), all.end(), std::pair(round, kinds), before);
+  if (at != all.end() && at->round == round && at->kinds == kinds) return *at;
+  return *all.insert(at, {round, kinds, {}});
 }
+
+}  // namespace
 
 std::size_t GridArrays::strands() const {
   std::size_t count = 0;
@@ -60,7 +59,7 @@ void GridBlocks::setUp(const GridTile& tile, const Receivers& receivers, std::sp
                        std::span<const std::uint32_t> slots, std::uint32_t lanes, std::uint32_t mostSteps) {
   groups_ = static_cast<std::size_t>(*std::max_element(tile.groupAt.begin(), tile.groupAt.end())) / kGroupBins;
   setKernels(tile);
-  countEntries();
+  sortEntries();
   setBlocks(tile, lanes, mostSteps);
   setReceivers(tile, receivers, members, slots);
 }
@@ -71,12 +70,14 @@ void GridBlocks::setKernels(const GridTile& tile) {
   const auto cell = static_cast<float>(tile.shape->resolution.cell);
   const int lastGroup = tile.firstGroup + static_cast<int>(tile.groupAt.size()) - 1;
   arrays_.kernels.resize(count);
-  reach_.resize(count);
-  kinds_.assign(kBlocks, 0);
+  // Beyond the end: what `put` below looks at in vain.
+  start_.assign((kBlocks + layout::kTileBlocks + 2) * groups_ + 2, 0);
+  kinds_.assign(kBlocks + layout::kTileBlocks + 2, 0);
+  const auto number = static_cast<std::uint32_t>(groups_);
+  std::size_t found = 0;
   for (std::size_t c = 0; c < tile.channels; ++c)
     arrays_.peaks[c].assign(p.peak[c].begin(), p.peak[c].begin() + static_cast<std::ptrdiff_t>(count));
   for (std::size_t i = 0; i < count; ++i) {
-    Reach& reach = reach_[i] = {0, 0, 0, 0, 0, -1};
     layout::GridKernel& kernel = arrays_.kernels[i] = {};
     const int window = windowOf(p, i);
     if (window == 0) continue;
@@ -110,38 +111,37 @@ void GridBlocks::setKernels(const GridTile& tile) {
     }
     const int first = numberOf(tile, p.firstBin[i] >> 2);
     if (first < 0 || columns.empty() || rows.empty()) continue;
-    reach = {columns.firstBlock(),
-             columns.lastBlock(),
-             rows.firstBlock(),
-             rows.lastBlock(),
-             first,
-             first + std::min(p.lastBin[i] >> 2, lastGroup) - (p.firstBin[i] >> 2)};
-    for (std::size_t row = reach.firstRow; row <= reach.lastRow; ++row)
-      for (std::size_t column = reach.firstColumn; column <= reach.lastColumn; ++column)
-        kinds_[row * layout::kTileBlocks + column] |= kind;
+    const auto groups = static_cast<std::uint32_t>(std::min(p.lastBin[i] >> 2, lastGroup) - (p.firstBin[i] >> 2) + 1);
+    const std::uint32_t firstRow = rows.firstBlock(), rowCount = rows.lastBlock() - firstRow + 1;
+    const std::uint32_t firstColumn = columns.firstBlock(), columnCount = columns.lastBlock() - firstColumn + 1;
+    if (found + 8 + rowCount * columnCount * groups > found_.size())
+      found_.resize(2 * (found + 8 + rowCount * columnCount * groups));
+    const auto put = [&](std::uint32_t row, std::uint32_t column, std::uint32_t group, bool really) {
+      const std::uint32_t block = (firstRow + row) * layout::kTileBlocks + firstColumn + column;
+      const std::uint32_t at = block * number + static_cast<std::uint32_t>(first) + group;
+      start_[at + 2] += really;
+      kinds_[block] |= really ? kind : 0;
+      found_[found] = {at, static_cast<std::uint32_t>(i)};
+      found += really;
+    };
+    if (rowCount <= 2 && columnCount <= 2 && groups <= 2) {  // without a loop whose end is a guess
+      for (std::uint32_t k = 0; k < 8; ++k)
+        put(k >> 2, k >> 1 & 1, k & 1, (k >> 2) < rowCount && (k >> 1 & 1) < columnCount && (k & 1) < groups);
+      continue;
+    }
+    for (std::uint32_t row = 0; row < rowCount; ++row)
+      for (std::uint32_t column = 0; column < columnCount; ++column)
+        for (std::uint32_t group = 0; group < groups; ++group) put(row, column, group, true);
   }
+  arrays_.entries.resize(found);
 }
 
-template <class Each>
-void GridBlocks::eachEntry(const Each& each) const {
-  for (std::size_t i = 0; i < reach_.size(); ++i) {
-    const Reach& reach = reach_[i];
-    for (int row = reach.firstRow; row <= reach.lastRow; ++row)
-      for (int column = reach.firstColumn; column <= reach.lastColumn; ++column) {
-        const std::size_t at = static_cast<std::size_t>(row * static_cast<int>(layout::kTileBlocks) + column) * groups_;
-        for (int group = reach.firstGroup; group <= reach.lastGroup; ++group)
-          each(at + static_cast<std::size_t>(group), static_cast<std::uint32_t>(i));
-      }
-  }
-}
-
-void GridBlocks::countEntries() {
+void GridBlocks::sortEntries() {
   // Counts stand two places on, then beginnings one place on, which become ends and so the next one's beginnings.
-  start_.assign(kBlocks * groups_ + 2, 0);
-  eachEntry([&](std::size_t block, std::uint32_t) { ++start_[block + 2]; });
+  start_.resize(kBlocks * groups_ + 2);
   for (std::size_t k = 2; k < start_.size(); ++k) start_[k] += start_[k - 1];
-  arrays_.entries.resize(start_.back());
-  eachEntry([&](std::size_t block, std::uint32_t i) { arrays_.entries[start_[block + 1]++] = i; });
+  for (std::size_t k = 0; k < arrays_.entries.size(); ++k)
+    arrays_.entries[start_[found_[k].block + 1]++] = found_[k].kernel;
 }
 
 void GridBlocks::setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint32_t mostSteps) {
@@ -166,14 +166,16 @@ void GridBlocks::setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint3
     std::uint32_t round = 0, steps = 0, last = 0;
     const auto finish = [&] {
       strand.end = static_cast<layout::uint>(arrays_.blocks.size());
-      if (strand.end > strand.first) arrays_.piecesOf(round++, kinds_[b]).strands.push_back(strand);
+      if (strand.end > strand.first) piecesOf(arrays_.pieces, round++, kinds_[b]).strands.push_back(strand);
       strand.first = strand.end, steps = 0;
     };
     for (std::size_t g = 0; g < groups_; ++g) {
       std::uint32_t first = start_[b * groups_ + g];
       const std::uint32_t end = start_[b * groups_ + g + 1];
       if (first < end) last = 2 * ++arrays_.storedBlocks;
-      arrays_.table[g * kBlocks + b] = last + (first < end ? 1 : 0);
+      const std::uint32_t entry = last + (first < end ? 1 : 0);
+      arrays_.table[g * kBlocks + b].here = entry;
+      if (b > 0) arrays_.table[g * kBlocks + b - 1].right = entry;
       while (first < end) {
         const std::uint32_t here = std::min(end - first, (mostSteps - steps - 1) * lanes);
         arrays_.blocks.push_back({first, first + here, arrays_.storedBlocks, binOf[g]});
@@ -212,51 +214,57 @@ void GridBlocks::setReceivers(const GridTile& tile, const Receivers& receivers, 
   }
 }
 
-void join(std::span<const GridArrays* const> tiles, std::size_t channels, GridArrays& all) {
-  struct Base {
-    std::uint32_t kernels, entries, blocks, table, receivers, stored;
-  };
-  Base end{0, 0, 0, 0, 0, 1};  // the first stored block is the one of zeros
-  std::vector<Base> bases;
-  const auto number = [](const auto& array) { return static_cast<std::uint32_t>(array.size()); };
-  all.pieces.clear();
+std::vector<GridArrays::Pieces> joinPieces(std::span<const GridArrays* const> tiles) {
+  std::vector<GridArrays::Pieces> all;
+  std::uint32_t blocks = 0;
   for (const GridArrays* tile : tiles) {
-    bases.push_back(end);
     for (const GridArrays::Pieces& pieces : tile->pieces) {
-      std::vector<layout::GridStrand>& to = all.piecesOf(pieces.round, pieces.kinds).strands;
+      std::vector<layout::GridStrand>& to = piecesOf(all, pieces.round, pieces.kinds).strands;
       for (layout::GridStrand strand : pieces.strands) {
-        strand.first += end.blocks, strand.end += end.blocks;
+        strand.first += blocks, strand.end += blocks;
         to.push_back(strand);
       }
     }
-    end = {end.kernels + number(tile->kernels),     end.entries + number(tile->entries),
-           end.blocks + number(tile->blocks),       end.table + number(tile->table),
-           end.receivers + number(tile->receivers), end.stored + tile->storedBlocks};
+    blocks += static_cast<std::uint32_t>(tile->blocks.size());
   }
-  all.kernels.resize(end.kernels), all.entries.resize(end.entries), all.blocks.resize(end.blocks);
-  all.table.resize(end.table), all.receivers.resize(end.receivers);
-  for (std::size_t c = 0; c < channels; ++c) all.peaks[c].resize(end.kernels);
-  all.storedBlocks = end.stored - 1;
+  return all;
+}
+
+void join(std::span<const GridArrays* const> tiles, std::size_t channels, const GridTargets& to) {
+  struct Base {
+    std::uint32_t kernels = 0, entries = 0, blocks = 0, table = 0, receivers = 0, stored = 0;
+  };
+  std::vector<Base> bases(tiles.size());
+  const auto number = [](const auto& array) { return static_cast<std::uint32_t>(array.size()); };
+  for (std::size_t t = 1; t < tiles.size(); ++t) {
+    const Base& last = bases[t - 1];
+    const GridArrays& tile = *tiles[t - 1];
+    bases[t] = {last.kernels + number(tile.kernels),     last.entries + number(tile.entries),
+                last.blocks + number(tile.blocks),       last.table + number(tile.table),
+                last.receivers + number(tile.receivers), last.stored + tile.storedBlocks};
+  }
   parallelBlocks(tiles.size(), 1, [&](std::size_t t, std::size_t) {
     const GridArrays& tile = *tiles[t];
     const Base& base = bases[t];
-    std::copy(tile.kernels.begin(), tile.kernels.end(), all.kernels.begin() + base.kernels);
+    std::copy(tile.kernels.begin(), tile.kernels.end(), to.kernels.begin() + base.kernels);
     for (std::size_t c = 0; c < channels; ++c)
-      std::copy(tile.peaks[c].begin(), tile.peaks[c].end(), all.peaks[c].begin() + base.kernels);
-    for (std::size_t k = 0; k < tile.entries.size(); ++k)
-      all.entries[base.entries + k] = tile.entries[k] + base.kernels;
+      std::copy(tile.peaks[c].begin(), tile.peaks[c].end(),
+                to.peaks.begin() + static_cast<std::ptrdiff_t>(c * to.kernels.size()) + base.kernels);
+    for (std::size_t k = 0; k < tile.entries.size(); ++k) to.entries[base.entries + k] = tile.entries[k] + base.kernels;
     for (std::size_t k = 0; k < tile.blocks.size(); ++k) {
       layout::GridBlock block = tile.blocks[k];
-      block.first += base.entries, block.end += base.entries, block.stored += base.stored - 1;
-      all.blocks[base.blocks + k] = block;
+      block.first += base.entries, block.end += base.entries, block.stored += base.stored;
+      to.blocks[base.blocks + k] = block;
     }
-    for (std::size_t k = 0; k < tile.table.size(); ++k)  // what lies before everything is the same block for all
-      all.table[base.table + k] = tile.table[k] < 2 ? 0 : tile.table[k] + 2 * (base.stored - 1);
+    // What lies before everything is the same block for all.
+    const auto entry = [&](std::uint32_t own) { return own < 2 ? 0 : own + 2 * base.stored; };
+    for (std::size_t k = 0; k < tile.table.size(); ++k)
+      to.table[base.table + k] = {entry(tile.table[k].here), entry(tile.table[k].right)};
     for (std::size_t k = 0; k < tile.receivers.size(); ++k) {
       layout::GridReceiver receiver = tile.receivers[k];
       receiver.table += base.table;
       if (receiver.self != kNoSlot) receiver.self += base.kernels;
-      all.receivers[base.receivers + k] = receiver;
+      to.receivers[base.receivers + k] = receiver;
     }
   });
 }

@@ -12,7 +12,7 @@ namespace mote {
 /// What kernels of a strand are; a strand with several kinds has all their bits.
 enum GridKernelKinds : std::uint32_t { kTentKernels = 1, kEllipseKernels = 2, kCurvedKernels = 4 };
 
-/// Everything that dispatches read, of one tile, or of several one after the other.
+/// Everything that dispatches read, of one tile.
 struct GridArrays {
   /// Pieces of strands, which go through the device together.
   struct Pieces {
@@ -26,11 +26,10 @@ struct GridArrays {
   std::vector<std::uint32_t> entries;
   std::vector<layout::GridBlock> blocks;
   std::vector<Pieces> pieces;  ///< by round, then by kinds
-  std::vector<std::uint32_t> table;
+  std::vector<layout::GridEntryPair> table;
   std::vector<layout::GridReceiver> receivers;
   std::uint32_t storedBlocks = 0;  ///< without the one of zeros
 
-  Pieces& piecesOf(std::uint32_t round, std::uint32_t kinds);
   std::size_t strands() const;
 };
 
@@ -44,27 +43,34 @@ class GridBlocks {
   const GridArrays& arrays() const { return arrays_; }
 
  private:
-  /// Blocks and groups that a particle has entries in; firstGroup > lastGroup: none.
-  struct Reach {
-    std::uint8_t firstColumn, lastColumn, firstRow, lastRow;
-    std::int32_t firstGroup, lastGroup;
+  struct Entry {
+    std::uint32_t block, kernel;  // block: with its group, as in start_
   };
   void setKernels(const GridTile& tile);
-  void countEntries();
+  void sortEntries();
   void setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint32_t mostSteps);
   void setReceivers(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
                     std::span<const std::uint32_t> slots);
-  template <class Each>
-  void eachEntry(const Each& each) const;
 
   GridArrays arrays_;
   std::size_t groups_ = 0;
-  std::vector<Reach> reach_;
+  std::vector<Entry> found_;          // particle by particle
   std::vector<std::uint32_t> start_;  // [block][group]: of entries
   std::vector<std::uint32_t> kinds_;  // [block]
 };
 
-/// Puts the arrays of tiles behind one another.
-void join(std::span<const GridArrays* const> tiles, std::size_t channels, GridArrays& all);
+/// Where the arrays of several tiles go, one behind the other; the device's own memory, perhaps.
+struct GridTargets {
+  std::span<layout::GridKernel> kernels;
+  std::span<float> peaks;  ///< [channel][kernel]
+  std::span<std::uint32_t> entries;
+  std::span<layout::GridBlock> blocks;
+  std::span<layout::GridEntryPair> table;
+  std::span<layout::GridReceiver> receivers;
+};
+/// Puts the arrays of tiles behind one another, numbers set right. Spans are as long as the tiles' arrays together.
+void join(std::span<const GridArrays* const> tiles, std::size_t channels, const GridTargets& to);
+/// … and the pieces of their strands.
+std::vector<GridArrays::Pieces> joinPieces(std::span<const GridArrays* const> tiles);
 
 }  // namespace mote

@@ -18,6 +18,26 @@ constexpr std::uint64_t kBatchBytes = std::uint64_t{64} << 20;
 /// Of a shader's loops: lavapipe ends them after 65535 altogether.
 constexpr std::uint32_t kMostSteps = 60000;
 
+/// A buffer's elements to be filled: where it is mapped they are the buffer's own, else they are copied at the end.
+template <class T>
+class Filling {
+ public:
+  Filling(const Device& device, const Buffer& to, std::uint64_t bytes) : device_(device), to_(to) {
+    if (!to.mapped()) own_.resize(bytes / sizeof(T));
+    elements = to.mapped() ? to.map<T>().first(bytes / sizeof(T)) : std::span<T>(own_);
+  }
+  Filling(const Filling&) = delete;
+  void finish() const {
+    if (!to_.mapped()) device_.upload<T>(to_, own_);
+  }
+  std::span<T> elements;
+
+ private:
+  const Device& device_;
+  const Buffer& to_;
+  std::vector<T> own_;
+};
+
 }  // namespace
 
 LightGridPass::LightGridPass(const Device& device)
@@ -49,16 +69,22 @@ const ComputePipeline& LightGridPass::fill(const FillVariant& variant) {
   return made;
 }
 
-LightGridPass::Sizes LightGridPass::sizesOf(const GridArrays& a) const {
+LightGridPass::Sizes LightGridPass::sum(const Sizes& a, const Sizes& b) {
+  Sizes all{};
+  for (std::size_t k = 0; k < all.size(); ++k) all[k] = a[k] + b[k];
+  return all;
+}
+
+LightGridPass::Sizes LightGridPass::sizesOf(const GridArrays& a, std::size_t channels) {
   constexpr std::uint64_t kFloat = sizeof(float), kUint = sizeof(layout::uint);
   const std::uint64_t kernels = a.kernels.size(), receivers = a.receivers.size();
   return {kernels * sizeof(layout::GridKernel),
-          kernels * kFloat,
+          kernels * kFloat * channels,
           a.entries.size() * kUint,
           a.blocks.size() * sizeof(layout::GridBlock),
           a.strands() * sizeof(layout::GridStrand),
-          (1 + std::uint64_t{a.storedBlocks}) * layout::kBlockPairs * sizeof(layout::GridPair),
-          a.table.size() * kUint,
+          std::uint64_t{a.storedBlocks} * layout::kBlockPairs * sizeof(layout::GridPair),
+          a.table.size() * sizeof(layout::GridEntryPair),
           receivers * sizeof(layout::GridReceiver),
           receivers * kFloat};
 }
@@ -87,17 +113,26 @@ void LightGridPass::makeRoom(const Sizes& sizes) {
   device_.upload<layout::GridPair>(buffers_.stored, std::vector<layout::GridPair>(layout::kBlockPairs));
 }
 
-std::vector<float> LightGridPass::run(const GridArrays& batch, std::size_t channels, layout::uint falloff,
-                                      double cell) {
-  makeRoom(sizesOf(batch));
+std::vector<float> LightGridPass::run(std::span<const GridArrays* const> tiles, std::size_t channels,
+                                      layout::uint falloff, double cell) {
+  Sizes sizes = kNoTiles;
+  for (const GridArrays* tile : tiles) sizes = sum(sizes, sizesOf(*tile, channels));
+  makeRoom(sizes);
   const Buffers& to = buffers_;
-  device_.upload<layout::GridKernel>(to.kernels, batch.kernels);
-  device_.upload<std::uint32_t>(to.entries, batch.entries);
-  device_.upload<layout::GridBlock>(to.blocks, batch.blocks);
-  device_.upload<std::uint32_t>(to.table, batch.table);
-  device_.upload<layout::GridReceiver>(to.receivers, batch.receivers);
+  const std::size_t kernels = sizes[0] / sizeof(layout::GridKernel);
+  const std::size_t receivers = sizes[7] / sizeof(layout::GridReceiver);
+  const Filling<layout::GridKernel> kernel(device_, to.kernels, sizes[0]);
+  const Filling<float> peaks(device_, to.peaks, sizes[1]);
+  const Filling<std::uint32_t> entries(device_, to.entries, sizes[2]);
+  const Filling<layout::GridBlock> blocks(device_, to.blocks, sizes[3]);
+  const Filling<layout::GridEntryPair> table(device_, to.table, sizes[6]);
+  const Filling<layout::GridReceiver> receiver(device_, to.receivers, sizes[7]);
+  join(tiles, channels,
+       {kernel.elements, peaks.elements, entries.elements, blocks.elements, table.elements, receiver.elements});
+  kernel.finish(), peaks.finish(), entries.finish(), blocks.finish(), table.finish(), receiver.finish();
+  const std::vector<GridArrays::Pieces> all = joinPieces(tiles);
   std::size_t strands = 0;
-  for (const GridArrays::Pieces& pieces : batch.pieces) {
+  for (const GridArrays::Pieces& pieces : all) {
     device_.upload<layout::GridStrand>(to.strands, pieces.strands, strands);
     strands += pieces.strands.size();
   }
@@ -115,18 +150,18 @@ std::vector<float> LightGridPass::run(const GridArrays& batch, std::size_t chann
     own.count = static_cast<layout::uint>(count);
     commands.dispatchRow(pipeline, own, (count + groupSize_ - 1) / groupSize_);
   };
-  const std::size_t eachGroup = groupSize_ / device_.mostSubgroupSize(), receivers = batch.receivers.size();
+  const std::size_t eachGroup = groupSize_ / device_.mostSubgroupSize();
   std::vector<float> depths(channels * receivers);
   for (std::size_t channel = 0; channel < channels; ++channel) {
-    device_.upload<float>(to.peaks, batch.peaks[channel]);
+    params.peaks = to.peaks.address() + channel * kernels * sizeof(float);
     queries_.reset();
     device_.run([&](CommandBuffer& commands) {
       const std::uint32_t stage = queries_.begin(commands, "light grid");
-      eachInvocation(commands, weigh(falloff), batch.kernels.size());
+      eachInvocation(commands, weigh(falloff), kernels);
       std::uint64_t strand = to.strands.address();
       std::uint32_t round = 0;
       commands.barrier(barrier::computeToCompute);
-      for (const GridArrays::Pieces& pieces : batch.pieces) {
+      for (const GridArrays::Pieces& pieces : all) {
         if (pieces.round != round) commands.barrier(barrier::computeToCompute);
         round = pieces.round;
         layout::GridParams own = params;
@@ -164,9 +199,8 @@ std::vector<float> LightGridPass::opticalDepths(const Octree& tree, const Receiv
   const auto finish = [&](std::size_t first, std::size_t last) {
     std::vector<const GridArrays*> parts;
     for (std::size_t w = first; w < last; ++w) parts.push_back(&works_[w].blocks.arrays());
-    join(parts, channels, batch_);
-    const std::vector<float> found = run(batch_, channels, options.falloff, resolution.cell);
-    const std::size_t all = batch_.receivers.size();
+    const std::vector<float> found = run(parts, channels, options.falloff, resolution.cell);
+    const std::size_t all = found.size() / channels;
     std::vector<std::size_t> start(last - first + 1, 0);
     for (std::size_t w = first; w < last; ++w)
       start[w - first + 1] = start[w - first] + works_[w].blocks.arrays().receivers.size();
@@ -199,11 +233,11 @@ std::vector<float> LightGridPass::opticalDepths(const Octree& tree, const Receiv
                              device_.leastSubgroupSize(), kMostSteps);
     });
     for (std::size_t first = 0, last = 0; first < end - begin; first = last) {
-      Sizes sizes{};
-      do {
-        const Sizes more = sizesOf(works_[last].blocks.arrays());
-        for (std::size_t k = 0; k < sizes.size(); ++k) sizes[k] += more[k];
-      } while (++last < end - begin && fits(sizes));
+      const auto with = [&](const Sizes& sizes, std::size_t w) {
+        return sum(sizes, sizesOf(works_[w].blocks.arrays(), channels));
+      };
+      Sizes sizes = with(kNoTiles, last++);
+      for (; last < end - begin && fits(with(sizes, last)); ++last) sizes = with(sizes, last);
       finish(first, last);
     }
   }

@@ -35,7 +35,7 @@ class LightGridPass {
   /// Device seconds of all opticalDepths calls so far, from timestamps.
   double deviceSeconds() const { return deviceSeconds_; }
   /// Gives back to the device's budget, and to the host, what the last opticalDepths needed; the next takes it again.
-  void release() { buffers_ = {}, works_ = {}, batch_ = {}; }
+  void release() { buffers_ = {}, works_ = {}; }
 
  private:
   struct FillVariant {
@@ -60,11 +60,15 @@ class LightGridPass {
 
   const ComputePipeline& fill(const FillVariant& variant);
   const ComputePipeline& weigh(layout::uint falloff);
-  Sizes sizesOf(const GridArrays& arrays) const;
+  /// The block of zeros.
+  static constexpr Sizes kNoTiles{0, 0, 0, 0, 0, layout::kBlockPairs * sizeof(layout::GridPair), 0, 0, 0};
+  static Sizes sizesOf(const GridArrays& arrays, std::size_t channels);
+  static Sizes sum(const Sizes& a, const Sizes& b);
   bool fits(const Sizes& sizes) const;
   void makeRoom(const Sizes& sizes);
   /// Optical depths of all receivers, [channel][receiver].
-  std::vector<float> run(const GridArrays& batch, std::size_t channels, layout::uint falloff, double cell);
+  std::vector<float> run(std::span<const GridArrays* const> tiles, std::size_t channels, layout::uint falloff,
+                         double cell);
 
   const Device& device_;
   TimestampQueries queries_;
@@ -74,7 +78,6 @@ class LightGridPass {
   ComputePipeline read_;
   Buffers buffers_;
   std::vector<Work> works_;
-  GridArrays batch_;
   double deviceSeconds_ = 0;
 };
 

@@ -10,19 +10,23 @@ const uint kNone = 0xffffffffu;
 void main() {
   const uint k = invocationOfDispatch();
   if (k >= params.count) return;
-  WordPairBuffer words = WordPairBuffer(params.receivers), stored = WordPairBuffer(params.stored);
+  WordPairBuffer words = WordPairBuffer(params.receivers), stored = WordPairBuffer(params.stored),
+                 places = WordPairBuffer(params.table);
   const uint first = k * kReceiverPairs;
   const vec2 xy = loadFloats(words, first);
   const uvec2 depthBin = loadPair(words, first + 1), tableSelf = loadPair(words, first + 2);
   const float intoBin = uintBitsToFloat(depthBin.x);
   const uint bin = depthBin.y, table = tableSelf.x, self = tableSelf.y;
   const vec2 below = clamp(floor(xy), 0.0, float(kBlockEdge * (kTileBlocks - 1) - 1)), into = xy - below;
+  const uint column = uint(below.x), row = uint(below.y), block = table + column / kBlockEdge;
+  const uvec2 entries[2] = {loadPair(places, block + row / kBlockEdge * kTileBlocks),
+                            loadPair(places, block + (row + 1) / kBlockEdge * kTileBlocks)};
   vec2 edges[4];
   [[unroll]] for (uint corner = 0; corner < 4; ++corner) {
-    const uint column = uint(below.x) + (corner & 1u), row = uint(below.y) + (corner >> 1);
-    const uint entry = params.table.at[table + row / kBlockEdge * kTileBlocks + column / kBlockEdge];
+    const uint c = column + corner % 2, r = row + corner / 2;
+    const uint entry = c / kBlockEdge == column / kBlockEdge ? entries[corner / 2].x : entries[corner / 2].y;
     const bool here = (entry & 1u) != 0;  // else all lies before: the last edge of the block that it names
-    const uint node = (here ? bin : kBlockBins - 1) * kBlockNodes + row % kBlockEdge * kBlockEdge + column % kBlockEdge;
+    const uint node = (here ? bin : kBlockBins - 1) * kBlockNodes + r % kBlockEdge * kBlockEdge + c % kBlockEdge;
     edges[corner] = loadFloats(stored, (entry >> 1) * kBlockPairs + node);
     edges[corner].x = here ? edges[corner].x : edges[corner].y;
   }

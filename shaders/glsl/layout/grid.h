@@ -88,6 +88,16 @@ MOTE_ASSERT_OFFSET(GridPair, before, 0);
 MOTE_ASSERT_OFFSET(GridPair, after, 4);
 MOTE_ASSERT_SIZE(GridPair, 8);
 
+// Where a group's depths over a tile's 4 × 4 nodes are: 2 · stored block, + 1 where it is of the group, else of one before.
+struct GridEntryPair {
+  uint here;
+  uint right;  // of the next 4 columns
+};
+MOTE_BUFFER(GridEntryPairBuffer, GridEntryPair)
+MOTE_ASSERT_OFFSET(GridEntryPair, here, 0);
+MOTE_ASSERT_OFFSET(GridEntryPair, right, 4);
+MOTE_ASSERT_SIZE(GridEntryPair, 8);
+
 struct GridReceiver {
   float x;     // [nodes from the tile's corner]
   float y;
@@ -113,7 +123,7 @@ struct GridParams {
   MOTE_ADDRESS(GridBlockBuffer) blocks;
   MOTE_ADDRESS(GridStrandBuffer) strands;
   MOTE_ADDRESS(GridPairBuffer) stored;   // kBlockPairs a block
-  MOTE_ADDRESS(UintBuffer) table;        // [group][block of the tile]: 2 · stored block, + 1 where it is of the group, else of one before
+  MOTE_ADDRESS(GridEntryPairBuffer) table;  // tile by tile, [group][block of the tile]
   MOTE_ADDRESS(GridReceiverBuffer) receivers;
   MOTE_ADDRESS(FloatBuffer) depths;      // out, of the receivers
   uint count;                            // of kernels, strands or receivers
