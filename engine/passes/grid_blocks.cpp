@@ -19,11 +19,16 @@ constexpr int kWidest = 64;
 /// Nodes: the device may round in another way than what says which a kernel covers.
 constexpr float kSlack = 1e-3f;
 
-/// Nodes from lo to hi, within the tile; none where hi < lo.
+/// Nodes from lo to hi, within the tile; none where hi < lo. By casts: this is asked for every particle, and rounding
+/// is a function's call where the machine's oldest instructions are all there is.
 struct Nodes {
-  float lo, hi;
-  Nodes(float from, float to) : lo(std::max(std::ceil(from), 0.0f)), hi(std::min(std::floor(to), float{kTileCells})) {}
-  bool empty() const { return !(lo <= hi); }
+  int lo, hi;
+  Nodes(float from, float to) {
+    const float low = std::clamp(from, 0.0f, float{kTileCells + 1}), high = std::clamp(to, -1.0f, float{kTileCells});
+    lo = static_cast<int>(low), hi = static_cast<int>(high + 1) - 1;
+    lo += static_cast<float>(lo) < low ? 1 : 0;
+  }
+  bool empty() const { return lo > hi; }
   std::uint32_t firstBlock() const { return static_cast<std::uint32_t>(lo) / layout::kBlockEdge; }
   std::uint32_t lastBlock() const { return static_cast<std::uint32_t>(hi) / layout::kBlockEdge; }
 };
