@@ -8,13 +8,9 @@
 namespace mote {
 namespace {
 
-constexpr std::size_t kBlocks = layout::kTileBlocks * layout::kTileBlocks;
+constexpr layout::uint kBlocks = layout::kTileBlocks * layout::kTileBlocks;
 static_assert(kTileCells + 1 <= layout::kBlockEdge * layout::kTileBlocks);
 static_assert(kGroupBins == layout::kBlockBins);
-
-/// The widest kernel that the device weighs [nodes]: lanes wait for the widest of their neighbours, and a shader may
-/// not loop for long.
-constexpr int kWidest = 64;
 
 /// Nodes: the device may round in another way than what says which a kernel covers.
 constexpr float kSlack = 1e-3f;
@@ -28,6 +24,7 @@ struct Nodes {
     lo = static_cast<int>(low), hi = static_cast<int>(high + 1) - 1;
     lo += static_cast<float>(lo) < low ? 1 : 0;
   }
+  Nodes(int from, int to) : lo(std::max(from, 0)), hi(std::min(to, kTileCells)) {}
   bool empty() const { return lo > hi; }
   std::uint32_t firstBlock() const { return static_cast<std::uint32_t>(lo) / layout::kBlockEdge; }
   std::uint32_t lastBlock() const { return static_cast<std::uint32_t>(hi) / layout::kBlockEdge; }
@@ -35,13 +32,6 @@ struct Nodes {
 
 /// Group by number among those that the tile has; < 0: left out.
 int numberOf(const GridTile& tile, int group) { return tile.placeOfGroup(group) / kGroupBins - 1; }
-
-/// How far from its centre a kernel has nodes: 1 for a tent, and of the two half widths of an ellipse the greater.
-float halfOf(const GridParticles& p, std::size_t i, int window) {
-  if (window == 2) return 1;
-  if (window != kAlone) return p.half[i];
-  return std::sqrt(std::max(p.a[i], p.c[i]) / (p.a[i] * p.c[i] - 0.25f * (p.b[i] * p.b[i])));
-}
 
 GridArrays::Pieces& piecesOf(std::vector<GridArrays::Pieces>& all, std::uint32_t round, std::uint32_t kinds) {
   const auto before = [](const GridArrays::Pieces& a, const std::pair<std::uint32_t, std::uint32_t>& b) {
@@ -60,17 +50,18 @@ std::size_t GridArrays::strands() const {
   return count;
 }
 
-void GridBlocks::setUp(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
+void GridBlocks::setUp(GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
                        std::span<const std::uint32_t> slots, std::uint32_t lanes, std::uint32_t mostSteps) {
   groups_ = static_cast<std::size_t>(*std::max_element(tile.groupAt.begin(), tile.groupAt.end())) / kGroupBins;
+  weighTile(tile, scale_);
   setKernels(tile);
   sortEntries();
   setBlocks(tile, lanes, mostSteps);
   setReceivers(tile, receivers, members, slots);
 }
 
-void GridBlocks::setKernels(const GridTile& tile) {
-  const GridParticles& p = tile.particles;
+void GridBlocks::setKernels(GridTile& tile) {
+  GridParticles& p = tile.particles;
   const std::size_t count = p.points.count;
   const auto cell = static_cast<float>(tile.shape->resolution.cell);
   const int lastGroup = tile.firstGroup + static_cast<int>(tile.groupAt.size()) - 1;
@@ -80,40 +71,30 @@ void GridBlocks::setKernels(const GridTile& tile) {
   kinds_.assign(kBlocks + layout::kTileBlocks + 2, 0);
   const auto number = static_cast<std::uint32_t>(groups_);
   std::size_t found = 0;
-  for (std::size_t c = 0; c < tile.channels; ++c)
+  const bool colours = tile.channels > 1;
+  for (std::size_t c = 0; colours && c < tile.channels; ++c)
     arrays_.peaks[c].assign(p.peak[c].begin(), p.peak[c].begin() + static_cast<std::ptrdiff_t>(count));
   for (std::size_t i = 0; i < count; ++i) {
     layout::GridKernel& kernel = arrays_.kernels[i] = {};
     const int window = windowOf(p, i);
-    if (window == 0) continue;
-    const float x = p.points.x[i], y = p.points.y[i];
-    kernel = {.x = x,
-              .y = y,
-              .depth = p.depth[i],
-              .inverseRadius = 1.0f / p.depthRadius[i],
-              .a = p.a[i],
-              .b = p.b[i],
-              .c = p.c[i],
-              .weight = 0,
-              .place = p.points.depth[i],
-              .mass = p.mass[i],
-              .window = 0,
-              .own = 0};
-    const float half = halfOf(p, i, window) + kSlack;
-    Nodes columns(x - half, x + half), rows(y - half, y + half);
-    std::uint32_t kind = window == 2 ? kTentKernels : kEllipseKernels;
-    if (window == 2) kernel.c = 0;
-    if (p.curved[i] > 0 || 2 * half > kWidest) {
-      const LoneKernel lone = weighAlone(tile, i);
-      kernel.mass = lone.scale, kernel.place = lone.own;
-      if (!(lone.scale > 0)) continue;
-      const auto column = static_cast<float>(lone.firstColumn), row = static_cast<float>(lone.firstRow);
-      columns = Nodes(column, column + static_cast<float>(lone.columns - 1));
-      rows = Nodes(row, row + static_cast<float>(lone.rows - 1));
-      if (p.curved[i] > 0) kind = kCurvedKernels, kernel.a = p.curved[i] * (cell * cell), kernel.b = 0, kernel.c = -1;
-    } else {
-      kernel.window = window == 2 ? 2 : static_cast<layout::uint>(std::ceil(2 * half));
+    if (window == 0) {
+      p.own[i] = 0;
+      continue;
     }
+    const float x = p.points.x[i], y = p.points.y[i], reach = reachOf(p, i, window) + kSlack;
+    Nodes columns(x - reach, x + reach), rows(y - reach, y + reach);
+    std::uint32_t kind = window == 2 ? kTentKernels : kEllipseKernels;
+    kernel = {x, y, p.depth[i], 1.0f / p.depthRadius[i], p.a[i], p.b[i], window == 2 ? 0.0f : p.c[i], scale_[i]};
+    if (p.curved[i] > 0 || reach > kMostReach) {
+      const LoneKernel lone = weighAlone(tile, i);
+      p.own[i] = lone.own;
+      if (!(lone.scale > 0)) continue;
+      kernel.scale = lone.scale;
+      columns = Nodes(lone.firstColumn, lone.firstColumn + lone.columns - 1);
+      rows = Nodes(lone.firstRow, lone.firstRow + lone.rows - 1);
+      if (p.curved[i] > 0) kind = kCurvedKernels, kernel.a = p.curved[i] * (cell * cell), kernel.b = 0, kernel.c = -1;
+    }
+    if (!colours) kernel.scale *= p.peak[0][i];
     const int first = numberOf(tile, p.firstBin[i] >> 2);
     if (first < 0 || columns.empty() || rows.empty()) continue;
     const auto groups = static_cast<std::uint32_t>(std::min(p.lastBin[i] >> 2, lastGroup) - (p.firstBin[i] >> 2) + 1);
@@ -199,23 +180,22 @@ void GridBlocks::setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint3
 void GridBlocks::setReceivers(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
                               std::span<const std::uint32_t> slots) {
   const GridPoints& points = tile.receiverPoints();
+  const GridParticles& p = tile.particles;
   arrays_.receivers.resize(members.size());
+  for (std::size_t c = 0; c < tile.channels; ++c) arrays_.own[c].assign(members.size(), 0.0f);
   for (std::size_t k = 0; k < members.size(); ++k) {
     const std::int32_t bin = points.bin[k];
-    std::uint32_t self = kNoSlot;
-    if (tile.receiversAreParticles) {
-      self = static_cast<std::uint32_t>(k);
-    } else {
+    arrays_.receivers[k] = {points.x[k], points.y[k], points.depth[k] - static_cast<float>(bin),
+                            static_cast<layout::uint>(numberOf(tile, bin >> 2)) * (kBlocks * layout::kBlockBins) +
+                                static_cast<layout::uint>(bin & (kGroupBins - 1))};
+    std::size_t self = k;
+    if (!tile.receiversAreParticles) {
       const std::uint32_t slot = receivers.selfOf(members[k]);
       const auto at = std::lower_bound(slots.begin(), slots.end(), slot);
-      if (at != slots.end() && *at == slot) self = static_cast<std::uint32_t>(at - slots.begin());
+      if (at == slots.end() || *at != slot) continue;
+      self = static_cast<std::size_t>(at - slots.begin());
     }
-    arrays_.receivers[k] = {points.x[k],
-                            points.y[k],
-                            points.depth[k] - static_cast<float>(bin),
-                            static_cast<layout::uint>(bin & (kGroupBins - 1)),
-                            static_cast<layout::uint>(numberOf(tile, bin >> 2)) * static_cast<layout::uint>(kBlocks),
-                            self};
+    for (std::size_t c = 0; c < tile.channels; ++c) arrays_.own[c][k] = p.peak[c][self] * p.own[self];
   }
 }
 
@@ -252,9 +232,13 @@ void join(std::span<const GridArrays* const> tiles, std::size_t channels, const 
     const GridArrays& tile = *tiles[t];
     const Base& base = bases[t];
     std::copy(tile.kernels.begin(), tile.kernels.end(), to.kernels.begin() + base.kernels);
-    for (std::size_t c = 0; c < channels; ++c)
-      std::copy(tile.peaks[c].begin(), tile.peaks[c].end(),
-                to.peaks.begin() + static_cast<std::ptrdiff_t>(c * to.kernels.size()) + base.kernels);
+    for (std::size_t c = 0; c < channels; ++c) {
+      if (!to.peaks.empty())
+        std::copy(tile.peaks[c].begin(), tile.peaks[c].end(),
+                  to.peaks.begin() + static_cast<std::ptrdiff_t>(c * to.kernels.size()) + base.kernels);
+      std::copy(tile.own[c].begin(), tile.own[c].end(),
+                to.own.begin() + static_cast<std::ptrdiff_t>(c * to.receivers.size()) + base.receivers);
+    }
     for (std::size_t k = 0; k < tile.entries.size(); ++k) to.entries[base.entries + k] = tile.entries[k] + base.kernels;
     for (std::size_t k = 0; k < tile.blocks.size(); ++k) {
       layout::GridBlock block = tile.blocks[k];
@@ -267,8 +251,7 @@ void join(std::span<const GridArrays* const> tiles, std::size_t channels, const 
       to.table[base.table + k] = {entry(tile.table[k].here), entry(tile.table[k].right)};
     for (std::size_t k = 0; k < tile.receivers.size(); ++k) {
       layout::GridReceiver receiver = tile.receivers[k];
-      receiver.table += base.table;
-      if (receiver.self != kNoSlot) receiver.self += base.kernels;
+      receiver.place += base.table * layout::kBlockBins;
       to.receivers[base.receivers + k] = receiver;
     }
   });

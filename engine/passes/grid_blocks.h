@@ -22,12 +22,13 @@ struct GridArrays {
   };
 
   std::vector<layout::GridKernel> kernels;
-  std::vector<float> peaks[3];
+  std::vector<float> peaks[3];  ///< of the kernels, where there are three channels
   std::vector<std::uint32_t> entries;
   std::vector<layout::GridBlock> blocks;
   std::vector<Pieces> pieces;  ///< by round, then by kinds
   std::vector<layout::GridEntryPair> table;
   std::vector<layout::GridReceiver> receivers;
+  std::vector<float> own[3];       ///< of the receivers: what each finds of its own particle
   std::uint32_t storedBlocks = 0;  ///< without the one of zeros
 
   std::size_t strands() const;
@@ -37,8 +38,8 @@ struct GridArrays {
 /// `lanes` of its particles. What a step is worth to the host: a few counts for each block that a particle touches.
 class GridBlocks {
  public:
-  /// `tile` is set up; `members` its receivers, `slots` its particles.
-  void setUp(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
+  /// `tile` is set up, and is weighed here; `members` are its receivers, `slots` its particles.
+  void setUp(GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
              std::span<const std::uint32_t> slots, std::uint32_t lanes, std::uint32_t mostSteps);
   const GridArrays& arrays() const { return arrays_; }
 
@@ -46,7 +47,7 @@ class GridBlocks {
   struct Entry {
     std::uint32_t block, kernel;  // block: with its group, as in start_
   };
-  void setKernels(const GridTile& tile);
+  void setKernels(GridTile& tile);
   void sortEntries();
   void setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint32_t mostSteps);
   void setReceivers(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
@@ -54,6 +55,7 @@ class GridBlocks {
 
   GridArrays arrays_;
   std::size_t groups_ = 0;
+  std::vector<float> scale_;          // of the tile's particles
   std::vector<Entry> found_;          // particle by particle
   std::vector<std::uint32_t> start_;  // [block][group]: of entries
   std::vector<std::uint32_t> kinds_;  // [block]
@@ -62,11 +64,12 @@ class GridBlocks {
 /// Where the arrays of several tiles go, one behind the other; the device's own memory, perhaps.
 struct GridTargets {
   std::span<layout::GridKernel> kernels;
-  std::span<float> peaks;  ///< [channel][kernel]
+  std::span<float> peaks;  ///< [channel][kernel]; none where there is one channel
   std::span<std::uint32_t> entries;
   std::span<layout::GridBlock> blocks;
   std::span<layout::GridEntryPair> table;
   std::span<layout::GridReceiver> receivers;
+  std::span<float> own;  ///< [channel][receiver]
 };
 /// Puts the arrays of tiles behind one another, numbers set right. Spans are as long as the tiles' arrays together.
 void join(std::span<const GridArrays* const> tiles, std::size_t channels, const GridTargets& to);

@@ -46,26 +46,19 @@ LightGridPass::LightGridPass(const Device& device)
       groupSize_(device.isCpu() ? device.subgroupSize() : std::max(64u, device.mostSubgroupSize())),
       storeLanes_(std::min(8u, device.leastSubgroupSize())) {}
 
-const ComputePipeline& LightGridPass::weigh(layout::uint falloff) {
-  ComputePipeline& made = weighs_[falloff];
-  if (made.handle() == VK_NULL_HANDLE)
-    made = device_.createComputePipeline(spirv::grid_weigh_comp, sizeof(layout::GridParams),
-                                         std::array<SpecializationConstant, 2>{{{0, groupSize_}, {1, falloff}}});
-  return made;
-}
-
 const ComputePipeline& LightGridPass::fill(const FillVariant& variant) {
   ComputePipeline& made = fills_[variant];
   if (made.handle() != VK_NULL_HANDLE) return made;
   const auto has = [&](std::uint32_t kind) { return std::uint32_t{(variant.kinds & kind) != 0}; };
   made = device_.createComputePipeline(spirv::grid_fill_comp, sizeof(layout::GridParams),
-                                       std::array<SpecializationConstant, 7>{{{0, groupSize_},
+                                       std::array<SpecializationConstant, 8>{{{0, groupSize_},
                                                                               {1, variant.falloff},
                                                                               {2, has(kTentKernels)},
                                                                               {3, has(kEllipseKernels)},
                                                                               {4, has(kCurvedKernels)},
                                                                               {5, variant.goesOn},
-                                                                              {6, storeLanes_}}});
+                                                                              {6, storeLanes_},
+                                                                              {7, variant.colours}}});
   return made;
 }
 
@@ -79,14 +72,14 @@ LightGridPass::Sizes LightGridPass::sizesOf(const GridArrays& a, std::size_t cha
   constexpr std::uint64_t kFloat = sizeof(float), kUint = sizeof(layout::uint);
   const std::uint64_t kernels = a.kernels.size(), receivers = a.receivers.size();
   return {kernels * sizeof(layout::GridKernel),
-          kernels * kFloat * channels,
+          channels > 1 ? channels * kernels * kFloat : 0,
           a.entries.size() * kUint,
           a.blocks.size() * sizeof(layout::GridBlock),
           a.strands() * sizeof(layout::GridStrand),
           std::uint64_t{a.storedBlocks} * layout::kBlockPairs * sizeof(layout::GridPair),
           a.table.size() * sizeof(layout::GridEntryPair),
           receivers * sizeof(layout::GridReceiver),
-          receivers * kFloat};
+          channels * receivers * kFloat};
 }
 
 bool LightGridPass::fits(const Sizes& sizes) const {
@@ -127,9 +120,11 @@ std::vector<float> LightGridPass::run(std::span<const GridArrays* const> tiles, 
   const Filling<layout::GridBlock> blocks(device_, to.blocks, sizes[3]);
   const Filling<layout::GridEntryPair> table(device_, to.table, sizes[6]);
   const Filling<layout::GridReceiver> receiver(device_, to.receivers, sizes[7]);
+  const Filling<float> own(device_, to.depths, sizes[8]);
   join(tiles, channels,
-       {kernel.elements, peaks.elements, entries.elements, blocks.elements, table.elements, receiver.elements});
-  kernel.finish(), peaks.finish(), entries.finish(), blocks.finish(), table.finish(), receiver.finish();
+       {kernel.elements, peaks.elements, entries.elements, blocks.elements, table.elements, receiver.elements,
+        own.elements});
+  kernel.finish(), peaks.finish(), entries.finish(), blocks.finish(), table.finish(), receiver.finish(), own.finish();
   const std::vector<GridArrays::Pieces> all = joinPieces(tiles);
   std::size_t strands = 0;
   for (const GridArrays::Pieces& pieces : all) {
@@ -145,39 +140,31 @@ std::vector<float> LightGridPass::run(std::span<const GridArrays* const> tiles, 
   if (read_.handle() == VK_NULL_HANDLE)
     read_ = device_.createComputePipeline(spirv::grid_read_comp, sizeof(layout::GridParams),
                                           std::array<SpecializationConstant, 1>{{{0, groupSize_}}});
-  const auto eachInvocation = [&](CommandBuffer& commands, const ComputePipeline& pipeline, std::size_t count) {
-    layout::GridParams own = params;
-    own.count = static_cast<layout::uint>(count);
-    commands.dispatchRow(pipeline, own, (count + groupSize_ - 1) / groupSize_);
-  };
   const std::size_t eachGroup = groupSize_ / device_.mostSubgroupSize();
-  std::vector<float> depths(channels * receivers);
-  for (std::size_t channel = 0; channel < channels; ++channel) {
-    params.peaks = to.peaks.address() + channel * kernels * sizeof(float);
-    queries_.reset();
-    device_.run([&](CommandBuffer& commands) {
-      const std::uint32_t stage = queries_.begin(commands, "light grid");
-      eachInvocation(commands, weigh(falloff), kernels);
+  queries_.reset();
+  device_.run([&](CommandBuffer& commands) {
+    const std::uint32_t stage = queries_.begin(commands, "light grid");
+    for (std::size_t channel = 0; channel < channels; ++channel) {
       std::uint64_t strand = to.strands.address();
       std::uint32_t round = 0;
-      commands.barrier(barrier::computeToCompute);
       for (const GridArrays::Pieces& pieces : all) {
         if (pieces.round != round) commands.barrier(barrier::computeToCompute);
         round = pieces.round;
-        layout::GridParams own = params;
-        own.strands = strand, own.count = static_cast<layout::uint>(pieces.strands.size());
+        params.strands = strand, params.count = static_cast<layout::uint>(pieces.strands.size());
         strand += pieces.strands.size() * sizeof(layout::GridStrand);
-        commands.dispatchRow(fill({falloff, pieces.kinds, round > 0}), own,
+        commands.dispatchRow(fill({falloff, pieces.kinds, round > 0, channels > 1}), params,
                              (pieces.strands.size() + eachGroup - 1) / eachGroup);
       }
       commands.barrier(barrier::computeToCompute);
-      eachInvocation(commands, read_, receivers);
-      queries_.end(commands, stage);
-    });
-    for (const StageTime& stage : queries_.results()) deviceSeconds_ += stage.seconds;
-    device_.downloadBytes(to.depths, 0, depths.data() + channel * receivers, receivers * sizeof(float));
-  }
-  return depths;
+      params.count = static_cast<layout::uint>(receivers);
+      commands.dispatchRow(read_, params, (receivers + groupSize_ - 1) / groupSize_);
+      commands.barrier(barrier::computeToCompute);  // the next channel takes the same nodes
+      params.peaks += kernels * sizeof(float), params.depths += receivers * sizeof(float);
+    }
+    queries_.end(commands, stage);
+  });
+  for (const StageTime& stage : queries_.results()) deviceSeconds_ += stage.seconds;
+  return device_.download<float>(to.depths, channels * receivers);
 }
 
 std::vector<float> LightGridPass::opticalDepths(const Octree& tree, const Receivers& receivers,

@@ -41,7 +41,7 @@ class LightGridPass {
   struct FillVariant {
     layout::uint falloff;
     std::uint32_t kinds;
-    bool goesOn;
+    bool goesOn, colours;
     auto operator<=>(const FillVariant&) const = default;
   };
   struct Buffers {
@@ -59,7 +59,6 @@ class LightGridPass {
   };
 
   const ComputePipeline& fill(const FillVariant& variant);
-  const ComputePipeline& weigh(layout::uint falloff);
   /// The block of zeros.
   static constexpr Sizes kNoTiles{0, 0, 0, 0, 0, layout::kBlockPairs * sizeof(layout::GridPair), 0, 0, 0};
   static Sizes sizesOf(const GridArrays& arrays, std::size_t channels);
@@ -73,7 +72,6 @@ class LightGridPass {
   const Device& device_;
   TimestampQueries queries_;
   std::uint32_t groupSize_, storeLanes_;
-  std::map<layout::uint, ComputePipeline> weighs_;
   std::map<FillVariant, ComputePipeline> fills_;
   ComputePipeline read_;
   Buffers buffers_;

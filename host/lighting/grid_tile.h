@@ -113,6 +113,14 @@ inline int windowOf(const GridParticles& p, std::size_t i) {
   return alone ? kAlone : static_cast<int>(nodes);
 }
 
+/// How far from its centre a kernel that is not curved has nodes: 1 for a tent, else the greater half width of its
+/// ellipse. `window`: windowOf.
+inline float reachOf(const GridParticles& p, std::size_t i, int window) {
+  if (window == 2) return 1;
+  if (window != kAlone) return p.half[i];
+  return std::sqrt(std::max(p.a[i], p.c[i]) / (p.a[i] * p.c[i] - 0.25f * (p.b[i] * p.b[i])));
+}
+
 /// Of a particle that goes alone: the nodes that its kernel covers, whether the tile has them or not, what its weights
 /// are multiplied with for a peak of 1 (0: it is not put down), and GridParticles::own.
 struct LoneKernel {
@@ -126,6 +134,10 @@ void placePoints(const GridTile& tile, GridPoints& points);
 /// Places of particles and their kernels.
 void placeParticles(GridTile& tile);
 LoneKernel weighAlone(const GridTile& tile, std::size_t particle);
+/// For who puts them down elsewhere: `scale`, what the weights of each are multiplied with for a peak of 1, and
+/// GridParticles::own. Those that are curved or reach farther than kMostReach are left out, for weighAlone.
+constexpr float kMostReach = 32;
+void weighTile(GridTile& tile, std::vector<float>& scale);
 /// Puts the kernels down, on nodes that are all 0, and sums along the depth.
 void fillTile(GridTile& tile);
 /// Optical depths of all receivers, [channel][receiver].

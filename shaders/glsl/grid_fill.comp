@@ -13,19 +13,29 @@
 #extension GL_EXT_control_flow_attributes : require
 #include "lib/grid.glsl"
 
+layout(constant_id = 1) const uint kFalloff = 0;
 layout(constant_id = 2) const bool kTents = true;     // there may be kernels that are tents …
 layout(constant_id = 3) const bool kEllipses = true;  // … or have a falloff on the light's plane …
 layout(constant_id = 4) const bool kCurved = true;    // … or near a point light
 layout(constant_id = 5) const bool kGoesOn = false;   // the strand's first block has sums already
 layout(constant_id = 6) const uint kStoreLanes = 4;   // at most as many as a subgroup has lanes; divides 16
+layout(constant_id = 7) const bool kColours = false;
 
 #include "lib/falloff.glsl"
 
 const uint kChunks = kBlockNodes / kStoreLanes;
 const uint kMostChunks = kBlockNodes;
+const uint kKernelPairs = 4;  // of a GridKernel
 
 float sum[kBlockNodes * kBlockBins];  // of the lane's particles, [bin][row][column]
 float carry[kMostChunks];             // the lane's nodes of each chunk: what lies before the block
+
+/// Share of a particle that lies before its centre plus x radii of depth.
+float depthShare(float x) {
+  const float a = min(abs(x), 1.0), a2 = a * a;
+  const float part = 0.9 * a - 0.5 * (a2 * a) + 0.1 * (a2 * a2 * a2);
+  return x < 0.0 ? 0.5 - part : 0.5 + part;
+}
 
 float weightAt(GridKernel p, float dx, float dy, float bdy, float cdy2, vec2 uv) {
   const float tent = kTents ? max(1.0 - abs(dx), 0.0) * max(1.0 - abs(dy), 0.0) : 0.0;
@@ -45,7 +55,8 @@ GridKernel kernelAt(uint i) {
   const uint first = i * kKernelPairs;
   const vec2 xy = loadFloats(words, first), along = loadFloats(words, first + 1), c = loadFloats(words, first + 3);
   const vec2 ab = kEllipses || kCurved ? loadFloats(words, first + 2) : vec2(0);
-  return GridKernel(xy.x, xy.y, along.x, along.y, ab.x, ab.y, c.x, c.y, 0.0, 0.0, 0, 0.0);
+  const float scale = kColours ? c.y * params.peaks.at[i] : c.y;
+  return GridKernel(xy.x, xy.y, along.x, along.y, ab.x, ab.y, c.x, scale);
 }
 
 void addParticle(GridKernel p, GridStrand strand, float bin) {
@@ -53,7 +64,7 @@ void addParticle(GridKernel p, GridStrand strand, float bin) {
   float before = depthShare((bin - p.depth) * p.inverseRadius);
   [[unroll]] for (uint k = 0; k < kBlockBins; ++k) {
     const float after = depthShare((bin + float(k + 1) - p.depth) * p.inverseRadius);
-    share[k] = p.weight * (after - before);
+    share[k] = p.scale * (after - before);
     before = after;
   }
   [[unroll]] for (uint r = 0; r < kBlockEdge; ++r) {
@@ -106,7 +117,7 @@ void main() {
     do {
       const uint i = params.entries.at[min(at, last)];
       GridKernel kernel = kernelAt(i);
-      kernel.weight = at <= last ? kernel.weight : 0.0;
+      kernel.scale = at <= last ? kernel.scale : 0.0;
       addParticle(kernel, strand, block.bin);
       at += gl_SubgroupSize, begin += gl_SubgroupSize;
     } while (begin <= last);

@@ -5,18 +5,15 @@
 #extension GL_EXT_control_flow_attributes : require
 #include "lib/grid.glsl"
 
-const uint kNone = 0xffffffffu;
-
 void main() {
-  const uint k = invocationOfDispatch();
+  const uint k =
+      (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
   if (k >= params.count) return;
   WordPairBuffer words = WordPairBuffer(params.receivers), stored = WordPairBuffer(params.stored),
                  places = WordPairBuffer(params.table);
-  const uint first = k * kReceiverPairs;
-  const vec2 xy = loadFloats(words, first);
-  const uvec2 depthBin = loadPair(words, first + 1), tableSelf = loadPair(words, first + 2);
-  const float intoBin = uintBitsToFloat(depthBin.x);
-  const uint bin = depthBin.y, table = tableSelf.x, self = tableSelf.y;
+  const vec2 xy = loadFloats(words, 2 * k);
+  const uvec2 along = loadPair(words, 2 * k + 1);
+  const uint table = along.y / kBlockBins, bin = along.y % kBlockBins;
   const vec2 below = clamp(floor(xy), 0.0, float(kBlockEdge * (kTileBlocks - 1) - 1)), into = xy - below;
   const uint column = uint(below.x), row = uint(below.y), block = table + column / kBlockEdge;
   const uvec2 entries[2] = {loadPair(places, block + row / kBlockEdge * kTileBlocks),
@@ -32,7 +29,6 @@ void main() {
   }
   const vec2 upper = edges[0] + into.x * (edges[1] - edges[0]), lower = edges[2] + into.x * (edges[3] - edges[2]);
   const vec2 both = upper + into.y * (lower - upper);
-  const float depth = between(both.x, both.y, intoBin);
-  const float own = params.kernels.at[self == kNone ? 0 : self].own;
-  params.depths.at[k] = self == kNone ? depth : max(depth - own, 0.0);
+  const float depth = both.x + uintBitsToFloat(along.x) * (both.y - both.x);
+  params.depths.at[k] = max(depth - params.depths.at[k], 0.0);
 }

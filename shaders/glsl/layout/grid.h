@@ -14,9 +14,8 @@ MOTE_CONST uint kBlockBins = 4u;
 MOTE_CONST uint kBlockPairs = 64u;
 MOTE_CONST uint kTileBlocks = 17u;   // along the edge of a tile of 65 nodes
 
-// A particle's kernel: q = a·Δx² + b·Δx·Δy + c·Δy² in nodes. Where c is 0 it is a tent over a cell. Where it is −1 the
-// light is near, and q = a · (Δx² + Δy² + (Δx·v − Δy·u)²) / n with (u, v) of the node, n = 1 + u² + v². Shaders load its
-// members in pairs.
+// A particle's kernel: weights F(q) with q = a·Δx² + b·Δx·Δy + c·Δy² in nodes. Where c is 0 it is a tent over a cell.
+// Where it is −1 the light is near, and q = a · (Δx² + Δy² + (Δx·v − Δy·u)²) / n with (u, v) of the node, n = 1 + u² + v².
 struct GridKernel {
   float x;              // [nodes from the tile's corner]
   float y;
@@ -25,11 +24,7 @@ struct GridKernel {
   float a;
   float b;
   float c;
-  float weight;         // out of grid_weigh.comp: factor on F of every node
-  float place;          // depth of the centre, where the particle as a receiver stands [bins]; window 0: see there
-  float mass;           // what the weights of all nodes are to add up to; window 0: the factor for a peak of 1
-  uint window;          // nodes across that may have weight; 0: the host has weighed it, `place` is its share of itself
-  float own;            // out of grid_weigh.comp: optical depth that the particle finds of itself
+  float scale;          // of the weights: optical depth; with three channels for a peak of 1
 };
 MOTE_BUFFER(GridKernelBuffer, GridKernel)
 MOTE_ASSERT_OFFSET(GridKernel, x, 0);
@@ -39,12 +34,8 @@ MOTE_ASSERT_OFFSET(GridKernel, inverseRadius, 12);
 MOTE_ASSERT_OFFSET(GridKernel, a, 16);
 MOTE_ASSERT_OFFSET(GridKernel, b, 20);
 MOTE_ASSERT_OFFSET(GridKernel, c, 24);
-MOTE_ASSERT_OFFSET(GridKernel, weight, 28);
-MOTE_ASSERT_OFFSET(GridKernel, place, 32);
-MOTE_ASSERT_OFFSET(GridKernel, mass, 36);
-MOTE_ASSERT_OFFSET(GridKernel, window, 40);
-MOTE_ASSERT_OFFSET(GridKernel, own, 44);
-MOTE_ASSERT_SIZE(GridKernel, 48);
+MOTE_ASSERT_OFFSET(GridKernel, scale, 28);
+MOTE_ASSERT_SIZE(GridKernel, 32);
 
 // The particles of one group of bins on 4 × 4 nodes.
 struct GridBlock {
@@ -102,31 +93,27 @@ struct GridReceiver {
   float x;     // [nodes from the tile's corner]
   float y;
   float into;  // its bin [bins]
-  uint bin;    // which of its group's
-  uint table;  // where its tile's part of the table for its group begins
-  uint self;   // number of the kernel that it leaves out, or none
+  uint place;  // 4 · where its group's part of the table begins + which of its group's the bin is
 };
 MOTE_BUFFER(GridReceiverBuffer, GridReceiver)
 MOTE_ASSERT_OFFSET(GridReceiver, x, 0);
 MOTE_ASSERT_OFFSET(GridReceiver, y, 4);
 MOTE_ASSERT_OFFSET(GridReceiver, into, 8);
-MOTE_ASSERT_OFFSET(GridReceiver, bin, 12);
-MOTE_ASSERT_OFFSET(GridReceiver, table, 16);
-MOTE_ASSERT_OFFSET(GridReceiver, self, 20);
-MOTE_ASSERT_SIZE(GridReceiver, 24);
+MOTE_ASSERT_OFFSET(GridReceiver, place, 12);
+MOTE_ASSERT_SIZE(GridReceiver, 16);
 
-// One dispatch of grid_weigh.comp, grid_fill.comp or grid_read.comp, of one channel.
+// One dispatch of grid_fill.comp or grid_read.comp, of one channel.
 struct GridParams {
   MOTE_ADDRESS(GridKernelBuffer) kernels;
-  MOTE_ADDRESS(FloatBuffer) peaks;       // of the kernels: optical depth through the centre
+  MOTE_ADDRESS(FloatBuffer) peaks;       // of the kernels: optical depth through the centre; three channels alone
   MOTE_ADDRESS(UintBuffer) entries;      // numbers of kernels, block after block
   MOTE_ADDRESS(GridBlockBuffer) blocks;
   MOTE_ADDRESS(GridStrandBuffer) strands;
   MOTE_ADDRESS(GridPairBuffer) stored;   // kBlockPairs a block
   MOTE_ADDRESS(GridEntryPairBuffer) table;  // tile by tile, [group][block of the tile]
   MOTE_ADDRESS(GridReceiverBuffer) receivers;
-  MOTE_ADDRESS(FloatBuffer) depths;      // out, of the receivers
-  uint count;                            // of kernels, strands or receivers
+  MOTE_ADDRESS(FloatBuffer) depths;      // in: what each receiver would find of its own particle; out: what it finds
+  uint count;                            // of strands or receivers
   float cell;                            // [on the plane one unit from a point light]
 };
 MOTE_ASSERT_OFFSET(GridParams, kernels, 0);
