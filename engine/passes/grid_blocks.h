@@ -34,8 +34,9 @@ struct GridArrays {
   std::size_t strands() const;
 };
 
-/// The arrays of a tile alone. A piece has as many steps as a shader may take: one a block, and one for each
-/// `lanes` of its particles. What a step is worth to the host: a few counts for each block that a particle touches.
+/// The arrays of a tile alone; holds on to its memory from tile to tile. A piece of a strand has as many steps as a
+/// shader may take, `mostSteps`: one a block, and one for each `lanes` of its particles. Linear in particles and in the
+/// blocks that they touch.
 class GridBlocks {
  public:
   /// `tile` is set up, and is weighed here; `members` are its receivers, `slots` its particles.

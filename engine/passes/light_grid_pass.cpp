@@ -1,7 +1,6 @@
 #include "engine/passes/light_grid_pass.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "engine/passes/part_size.h"
 #include "host/core/parallel.h"
@@ -82,8 +81,8 @@ LightGridPass::Sizes LightGridPass::sizesOf(const GridArrays& a, std::size_t cha
           channels * receivers * kFloat};
 }
 
-bool LightGridPass::fits(const Sizes& sizes) const {
-  const auto held = const_cast<Buffers&>(buffers_).all();
+bool LightGridPass::fits(const Sizes& sizes) {
+  const auto held = buffers_.all();
   std::uint64_t own = 0, bytes = 0;
   for (std::size_t k = 0; k < sizes.size(); ++k) own += device_.bufferCost(held[k]->size()), bytes += sizes[k];
   if (bytes > kBatchBytes) return false;

@@ -1,14 +1,15 @@
 // The light grid in compute shaders: mote::gridOpticalDepths (host/lighting/light_grid.h) on the device.
 //
-// The host plans the tiles and places particles and receivers, in double, and sorts each tile's particles by the blocks
-// of 4 × 4 nodes and 4 bins that their kernels touch (grid_blocks.h). Then the device weighs each particle
-// (grid_weigh.comp), puts all down and sums along the depth (grid_fill.comp, a subgroup for all blocks over the same
-// nodes), and reads what the receivers find (grid_read.comp). Blocks that no particle touches are not stored. Kernels
-// wider than eight nodes, or near a point light, are weighed by the host, one by one, as gridOpticalDepths does it.
+// The host plans the tiles, places particles and receivers, in double, weighs the kernels in the same step, and sorts
+// each tile's particles by the blocks of 4 × 4 nodes and 4 bins that their kernels touch (grid_blocks.h). The device
+// puts them down and sums along the depth (grid_fill.comp, a subgroup for all blocks over the same nodes), and reads
+// what the receivers find (grid_read.comp). Blocks that no particle touches are not stored. The two dispatches are what
+// grows with a finer grid. Sums of weights are left to the host, as it has the kernels in its vectors anyhow: on
+// lavapipe a shader of its own took four times as long, mostly to load them.
 //
-// This suits hardware: a particle is loaded once for 64 multiply-adds on sums in registers, kernels go by lanes and
-// strands by subgroups, thousands of them at once; stores are side by side; there is no atomic, shared memory or
-// barrier of a workgroup, so sums are always in the same order. (So it should; it was measured on lavapipe alone.)
+// This suits hardware: a kernel is loaded once for 64 multiply-adds on sums in registers, strands go by subgroups,
+// thousands of them at once; stores are side by side; there is no atomic, shared memory or barrier of a workgroup, so
+// sums are always in the same order. (So it should; it was measured on lavapipe alone.)
 #pragma once
 #include <array>
 #include <map>
@@ -25,9 +26,12 @@ class LightGridPass {
   /// `device` must outlive the pass.
   explicit LightGridPass(const Device& device);
 
-  /// As mote::gridOpticalDepths, T within 2e-5 of it; the same bits each time on the same device. Tiles go through the
-  /// device in batches of about 64 MiB, or what the budget leaves of it, but one at least: throws MachineError where a
-  /// tile does not fit. On the host about 300 bytes a particle of a batch.
+  /// As mote::gridOpticalDepths, T within 2e-5 of it; the same bits each time on devices with subgroups of one size,
+  /// whatever their budget. Tiles go through the device in batches of about 64 MiB, or what the budget leaves of it,
+  /// but one at least: throws MachineError where a single tile does not fit. Each takes there 32 bytes a particle (44
+  /// with three channels), 4 for each block that it touches, 20 a receiver (28), and 512 a block that is touched; on
+  /// the host three times as much while a batch is prepared. About three times the CPU time of gridOpticalDepths on
+  /// lavapipe.
   std::vector<float> opticalDepths(const Octree& tree, const Receivers& receivers, const layout::Light& light,
                                    const LightingOptions& options, const GridResolution& resolution,
                                    std::span<const std::uint8_t> reached = {}, const RaysDone& done = {});
@@ -46,8 +50,8 @@ class LightGridPass {
   };
   struct Buffers {
     Buffer kernels, peaks, entries, blocks, strands, stored, table, receivers, depths;
-    auto all() {
-      return std::array{&kernels, &peaks, &entries, &blocks, &strands, &stored, &table, &receivers, &depths};
+    std::array<Buffer*, 9> all() {
+      return {&kernels, &peaks, &entries, &blocks, &strands, &stored, &table, &receivers, &depths};
     }
   };
   /// Bytes of each, in that order.
@@ -63,7 +67,7 @@ class LightGridPass {
   static constexpr Sizes kNoTiles{0, 0, 0, 0, 0, layout::kBlockPairs * sizeof(layout::GridPair), 0, 0, 0};
   static Sizes sizesOf(const GridArrays& arrays, std::size_t channels);
   static Sizes sum(const Sizes& a, const Sizes& b);
-  bool fits(const Sizes& sizes) const;
+  bool fits(const Sizes& sizes);
   void makeRoom(const Sizes& sizes);
   /// Optical depths of all receivers, [channel][receiver].
   std::vector<float> run(std::span<const GridArrays* const> tiles, std::size_t channels, layout::uint falloff,

@@ -1,5 +1,5 @@
 // mote bench lighting: a noise cloud lit by one point light: build of the octree, then the exact optical depths on TBB
-// against plain packets (equal radii, and radii over a decade) and in the compute shader.
+// against plain packets (equal radii, and radii over a decade) and in the compute shader, and the light grid on both.
 #include <tbb/parallel_sort.h>
 
 #include <cmath>
@@ -138,7 +138,6 @@ void benchLighting(Bench& bench) {
   againstPlainPackets(bench, "exact, equal radii", cloud, light, options);
   againstPlainPackets(bench, "exact, radii 10:1", benchCloud(bench.count(), options.falloff, {.range = kRadiusRange}),
                       light, options);
-  lightGrids(bench, tree, light, options);
 
   std::vector<float> onHost, onDevice;
   const Contender host{"lighting on TBB", [&] { onHost = opticalDepths(tree, light, options); }};
@@ -157,6 +156,7 @@ void benchLighting(Bench& bench) {
                           [&] { return scalarCheck(bench.count(), light, options); });
   }
   if (times) addFloors(bench, *times);
+  lightGrids(bench, tree, light, options);
 }
 
 }  // namespace mote

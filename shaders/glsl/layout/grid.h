@@ -2,7 +2,7 @@
 //
 // Nodes of a tile go in blocks of 4 × 4, bins of depth in groups of 4. A stored block has the optical depths at both edges
 // of each of a group's bins for 16 nodes, [bin][row][column]; those of a tile's 4 × 4 nodes that any particle touches
-// stand one behind the other, by depth. Block 0 is all zeros: what lies before everything.
+// stand one behind the other, by depth. Block 0 is all zeros: what lies before everything. Shaders load two words at once.
 #ifndef MOTE_LAYOUT_GRID_H
 #define MOTE_LAYOUT_GRID_H
 #include "types.h"
