@@ -348,7 +348,7 @@ TEST_F(Budget, TreeThatWouldFitWithoutItsRaysIsCut) {
   EXPECT_LE(worst, 2e-5);
 }
 
-TEST(Budget, LightsByAGridInBatchesToTheSameBits) {
+TEST_F(Budget, LightsByAGridInBatchesToTheSameBits) {
   std::vector<vec3> position;
   for (std::size_t i = 0; i < 30000; ++i) {
     Random r(19, i);
@@ -362,7 +362,7 @@ TEST(Budget, LightsByAGridInBatchesToTheSameBits) {
       LightGridPass pass(device);
       return pass.opticalDepths(tree, slotsOf(tree), pointLight({2, 3, 1}), {}, {0.004, 0.03});
     };
-    const std::vector<float> whole = lit(GpuEnvironment::instance().gpu().device());
+    const std::vector<float> whole = lit(device());
     for (const bool stageAlways : {false, true}) {
       const SmallDevice small(12u << 20, stageAlways);
       EXPECT_EQ(lit(small.device()), whole);
