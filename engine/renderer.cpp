@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "engine/passes/light_grid_pass.h"
 #include "engine/passes/light_pass.h"
 #include "engine/passes/solid_pass.h"
 #include "engine/picture.h"
@@ -66,12 +67,20 @@ namespace {
 class DeviceShadows {
  public:
   DeviceShadows(const Device& device, const Frame& frame, std::vector<LightMethod>* methods)
-      : frame_(frame), methods_(methods), light_(device, frame.rules.falloff, frame.rules.endpoint), solids_(device) {
+      : frame_(frame),
+        methods_(methods),
+        light_(device, frame.rules.falloff, frame.rules.endpoint),
+        grid_(device),
+        solids_(device) {
     if (!frame.solidTree.empty()) solids_.setTree(frame.solidTree);
     depths_.exact = [this](const Octree& tree, const Receivers& receivers, const layout::Light& light,
                            const LightingOptions& options, std::span<const std::uint8_t> reached,
                            const RaysDone& done) { return sums(tree, receivers, light, options, reached, done); };
-    depths_.grid = gridOpticalDepths;
+    depths_.grid = [this](const Octree& tree, const Receivers& receivers, const layout::Light& light,
+                          const LightingOptions& options, const GridResolution& resolution,
+                          std::span<const std::uint8_t> reached, const RaysDone& done) {
+      return grid_.opticalDepths(tree, receivers, light, options, resolution, reached, done);
+    };
   }
   DeviceShadows(const DeviceShadows&) = delete;
   DeviceShadows& operator=(const DeviceShadows&) = delete;
@@ -86,13 +95,14 @@ class DeviceShadows {
   }
 
   void addTo(FrameStats& stats) const {
-    stats.deviceSeconds["lighting"] += light_.deviceSeconds() + solids_.deviceSeconds();
+    stats.deviceSeconds["lighting"] += light_.deviceSeconds() + grid_.deviceSeconds() + solids_.deviceSeconds();
   }
 
  private:
   /// The frame's tree stays on the device from light to light; others are gone when the call is over.
   std::vector<float> sums(const Octree& tree, const Receivers& receivers, const layout::Light& light,
                           const LightingOptions& options, std::span<const std::uint8_t> reached, const RaysDone& done) {
+    grid_.release();
     const bool lasts = &tree == &frame_.density.tree();
     if (!lasts || !holdsFrame_) light_.setTree(tree);  // into what is left
     holdsFrame_ = lasts;
@@ -102,6 +112,7 @@ class DeviceShadows {
   const Frame& frame_;
   std::vector<LightMethod>* methods_;
   LightPass light_;
+  LightGridPass grid_;
   SolidPass solids_;
   DepthSources depths_;
   bool holdsFrame_ = false;

@@ -172,6 +172,78 @@ HWY_INLINE void weigh(const GridParticles& p, std::size_t first, Batch& batch) {
   }
 }
 
+// ---- the same for who puts them down elsewhere
+
+/// Nodes across that have all of a batch's kernels, an even number, and which of them are tents.
+struct BatchWindow {
+  int nodes = 2;
+  alignas(64) float tent[kGridBatch] = {};
+
+  BatchWindow(const GridParticles& p, std::size_t first) {
+    for (std::size_t lane = 0; lane < std::min(kGridBatch, p.points.count - first); ++lane) {
+      const std::size_t i = first + lane;
+      const int window = windowOf(p, i);
+      if (window == 2) tent[lane] = 1;
+      if (window <= 2 || p.curved[i] > 0) continue;
+      const float reach = reachOf(p, i, window);
+      if (reach <= kMostReach) nodes = std::max(nodes, 2 * static_cast<int>(std::ceil(reach)));
+    }
+  }
+};
+
+/// Sums of F over windows of any width, and F between the nodes where the particles stand.
+template <layout::uint kFalloff>
+HWY_NOINLINE void weighAll(GridTile& tile, float* scales) {
+  GridParticles& p = tile.particles;
+  for (std::size_t first = 0; first < p.points.count; first += kGridBatch) {
+    const BatchWindow window(p, first);
+    for (std::size_t lane = 0; lane < kGridBatch; lane += kLanes) {
+      const std::size_t i = first + lane;
+      const Vec x = load(&p.points.x[i]), y = load(&p.points.y[i]), one = set(1), zero = hn::Zero(kTag);
+      const Vec a = load(&p.a[i]), b = load(&p.b[i]), c = load(&p.c[i]);
+      const auto tent = hn::Gt(load(window.tent + lane), zero);
+      const auto weight = [&](Vec dx, Vec dy) {
+        const Vec q = hn::Add(hn::Mul(hn::Add(hn::Mul(a, dx), hn::Mul(b, dy)), dx), hn::Mul(c, hn::Mul(dy, dy)));
+        return falloffOf<kFalloff>(kTag, q);
+      };
+      const Vec intoX = hn::Sub(x, hn::Floor(x)), intoY = hn::Sub(y, hn::Floor(y));
+      Vec sum = one;  // of a tent
+      if (!hn::AllTrue(kTag, tent)) {
+        const Vec before = set(static_cast<float>(window.nodes / 2 - 1));
+        const Vec beginX = hn::Neg(hn::Add(intoX, before)), beginY = hn::Neg(hn::Add(intoY, before));
+        Vec all = zero;
+        for (int row = 0; row < window.nodes; ++row) {
+          const Vec dy = hn::Add(beginY, set(static_cast<float>(row)));
+          for (int column = 0; column < window.nodes; ++column)
+            all = hn::Add(all, weight(hn::Add(beginX, set(static_cast<float>(column))), dy));
+        }
+        sum = hn::IfThenElse(tent, one, all);
+      }
+      const Vec backX = hn::Sub(one, intoX), backY = hn::Sub(one, intoY);
+      const auto corner = [&](Vec dx, Vec dy, Vec tentX, Vec tentY) {
+        return hn::IfThenElse(tent, hn::Mul(tentX, tentY), weight(dx, dy));
+      };
+      const Vec leftX = hn::Neg(intoX), leftY = hn::Neg(intoY);
+      const Vec lower = between(corner(leftX, leftY, backX, backY), corner(backX, leftY, intoX, backY), intoX);
+      const Vec upper = between(corner(leftX, backY, backX, intoY), corner(backX, backY, intoX, intoY), intoX);
+      const Vec inverse = hn::Div(one, load(&p.depthRadius[i])), scale = hn::Div(load(&p.mass[i]), sum);
+      hn::StoreU(scale, kTag, scales + i);
+      const Vec across = hn::Mul(scale, between(lower, upper, intoY));
+      hn::StoreU(hn::Mul(across, ownDepthShare(p, i, load(&p.depth[i]), inverse)), kTag, &p.own[i]);
+    }
+  }
+}
+
+void weighBatches(GridTile& tile, float* scales) {
+  switch (tile.falloff) {
+    case layout::kFalloffLinear: return weighAll<layout::kFalloffLinear>(tile, scales);
+    case layout::kFalloffSphere: return weighAll<layout::kFalloffSphere>(tile, scales);
+    default: return weighAll<layout::kFalloffSmooth>(tile, scales);
+  }
+}
+
+// ---- putting down
+
 /// Adds one particle of a batch that was weighed for this window.
 template <int kNodes>
 HWY_INLINE void putDown(GridTile& tile, const Batch& batch, std::size_t first, std::size_t lane) {
@@ -296,17 +368,37 @@ float ownShare(const GridParticles& p, std::size_t i, const Footprint& f, float 
   return scale * (lower + wy * (upper - lower)) * (before + wd * (after - before));
 }
 
+/// Draws the particle's kernel into `f`.
+template <layout::uint kFalloff>
+HWY_INLINE LoneKernel weighLone(const GridTile& tile, std::size_t i, Footprint& f) {
+  static thread_local std::vector<float> weighted;
+  const GridParticles& p = tile.particles;
+  const float sum =
+      p.curved[i] > 0 ? drawCurvedFootprint<kFalloff>(tile, i, f, weighted) : drawFootprint<kFalloff>(p, i, f);
+  LoneKernel kernel{f.x0, f.y0, f.columns, f.rows};
+  if (!(sum > 0)) return kernel;
+  kernel.scale = p.mass[i] / sum;
+  kernel.own = ownShare(p, i, f, kernel.scale);
+  return kernel;
+}
+
+LoneKernel weighOne(const GridTile& tile, std::size_t i) {
+  static thread_local Footprint f;
+  switch (tile.falloff) {
+    case layout::kFalloffLinear: return weighLone<layout::kFalloffLinear>(tile, i, f);
+    case layout::kFalloffSphere: return weighLone<layout::kFalloffSphere>(tile, i, f);
+    default: return weighLone<layout::kFalloffSmooth>(tile, i, f);
+  }
+}
+
 template <layout::uint kFalloff>
 HWY_NOINLINE void putDownAlone(GridTile& tile, std::size_t i) {
   static thread_local Footprint f;
-  static thread_local std::vector<float> weighted;
   GridParticles& p = tile.particles;
-  const float sum =
-      p.curved[i] > 0 ? drawCurvedFootprint<kFalloff>(tile, i, f, weighted) : drawFootprint<kFalloff>(p, i, f);
-  p.own[i] = 0;
-  if (!(sum > 0)) return;
-  const float scale = p.mass[i] / sum, inverse = 1.0f / p.depthRadius[i];
-  p.own[i] = ownShare(p, i, f, scale);
+  const LoneKernel kernel = weighLone<kFalloff>(tile, i, f);
+  p.own[i] = kernel.own;
+  if (!(kernel.scale > 0)) return;
+  const float scale = kernel.scale, inverse = 1.0f / p.depthRadius[i];
   const int last = tile.shape->tileCells;
   const int rowBegin = std::max(f.y0, 0), rowEnd = std::min(f.y0 + f.rows - 1, last);
   const int columnBegin = std::max(f.x0, 0), columnEnd = std::min(f.x0 + f.columns - 1, last);
@@ -330,16 +422,6 @@ HWY_NOINLINE void putDownAlone(GridTile& tile, std::size_t i) {
 }
 
 // ---- fill
-
-/// Nodes across of the window that a particle goes through a batch with; 0: it is not put down, kAlone: alone.
-constexpr int kAlone = kMostWindow + 1;
-HWY_INLINE int windowOf(const GridParticles& p, std::size_t i) {
-  if (!(p.half[i] > 0)) return 0;
-  const float nodes = std::max(std::ceil(2 * p.half[i]), 2.0f);
-  const bool alone =
-      nodes > kMostWindow || p.curved[i] > 0 || (p.lastBin[i] >> 2) - (p.firstBin[i] >> 2) >= kMostGroups;
-  return alone ? kAlone : static_cast<int>(nodes);
-}
 
 template <layout::uint kFalloff, int kNodes>
 HWY_INLINE void fillBatch(GridTile& tile, std::size_t first, const int (&window)[kGridBatch], Batch& batch) {
@@ -460,7 +542,16 @@ namespace mote {
 
 HWY_EXPORT(fill);
 HWY_EXPORT(read);
+HWY_EXPORT(weighOne);
+HWY_EXPORT(weighBatches);
 
+LoneKernel weighAlone(const GridTile& tile, std::size_t particle) {
+  return HWY_DYNAMIC_DISPATCH(weighOne)(tile, particle);
+}
+void weighTile(GridTile& tile, std::vector<float>& scale) {
+  if (scale.size() < tile.particles.own.size()) scale.resize(tile.particles.own.size());
+  HWY_DYNAMIC_DISPATCH(weighBatches)(tile, scale.data());
+}
 void fillTile(GridTile& tile) { HWY_DYNAMIC_DISPATCH(fill)(tile); }
 void readTile(const GridTile& tile, std::vector<float>& depths) {
   depths.resize(tile.channels * tile.receivers);

@@ -191,6 +191,18 @@ class Binning {
   std::vector<std::size_t> around_;
 };
 
+std::vector<LightFrame> facesOf(const layout::Light& light) {
+  if (light.type == layout::kLightDirectional)
+    return {frameAbout(dvec3(0), glm::normalize(dvec3(light.direction)), false)};
+  std::vector<LightFrame> faces;
+  for (int k = 0; k < 6; ++k) {
+    dvec3 axis(0), u(0), v(0);
+    axis[k / 2] = k % 2 == 0 ? 1 : -1, u[(k / 2 + 1) % 3] = 1, v[(k / 2 + 2) % 3] = 1;
+    faces.push_back({true, dvec3(light.position), u, v, axis});
+  }
+  return faces;
+}
+
 std::vector<std::uint32_t> slotsNearLight(const Located& located) {
   std::vector<std::uint32_t> slots;
   for (std::size_t slot = 0; slot < located.flags.size(); ++slot)
@@ -208,16 +220,8 @@ KernelMoments kernelMoments(layout::uint falloff) {
   }
 }
 
-std::vector<LightFrame> gridFaces(const layout::Light& light) {
-  if (light.type == layout::kLightDirectional)
-    return {frameAbout(dvec3(0), glm::normalize(dvec3(light.direction)), false)};
-  std::vector<LightFrame> faces;
-  for (int k = 0; k < 6; ++k) {
-    dvec3 axis(0), u(0), v(0);
-    axis[k / 2] = k % 2 == 0 ? 1 : -1, u[(k / 2 + 1) % 3] = 1, v[(k / 2 + 2) % 3] = 1;
-    faces.push_back({true, dvec3(light.position), u, v, axis});
-  }
-  return faces;
+GridShape gridShape(const layout::Light& light, const GridResolution& resolution, layout::uint falloff) {
+  return {facesOf(light), resolution, kTileCells, kernelMoments(falloff)};
 }
 
 NodeRange curvedNodeRange(const dvec3& centre, double radius, const LightFrame& face, double cell) {

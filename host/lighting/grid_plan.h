@@ -27,6 +27,9 @@ struct KernelMoments {
 };
 KernelMoments kernelMoments(layout::uint falloff);
 
+/// Along a tile's edge: wide enough that few particles lie in several, and their nodes still pass through the caches.
+constexpr int kTileCells = 64;
+
 /// What all tiles of a grid share.
 struct GridShape {
   /// One plane for a directional light, else the six faces of a cube along the world's axes about the light.
@@ -37,7 +40,7 @@ struct GridShape {
 
   bool perspective() const { return faces.front().perspective; }
 };
-std::vector<LightFrame> gridFaces(const layout::Light& light);
+GridShape gridShape(const layout::Light& light, const GridResolution& resolution, layout::uint falloff);
 
 /// A tile by number on its face: it has the cells from column · tileCells, row · tileCells on.
 struct TilePlace {

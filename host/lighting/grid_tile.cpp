@@ -16,6 +16,28 @@ void growTo(std::vector<T>& array, std::size_t size) {
   if (array.size() < size + kGridBatch) array.resize(size + size / 2 + kGridBatch);
 }
 
+/// Copies what a tile has from the tree.
+void fetchParticles(const Octree& tree, std::span<const std::uint32_t> slots, GridTile& tile) {
+  GridParticles& to = tile.particles;
+  to.resize(slots.size(), tile.channels);
+  const std::vector<float>* peaks[] = {&tree.peak, &tree.peakGreen, &tree.peakBlue};
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    const std::uint32_t slot = slots[i];
+    to.points.sourceX[i] = tree.x[slot], to.points.sourceY[i] = tree.y[slot], to.points.sourceZ[i] = tree.z[slot];
+    to.radius[i] = tree.radius[slot];
+    for (std::size_t c = 0; c < tile.channels; ++c) to.peak[c][i] = (*peaks[c])[slot];
+  }
+}
+
+void fetchReceivers(const Receivers& receivers, std::span<const std::uint32_t> members, GridTile& tile) {
+  GridPoints& to = tile.otherPoints;
+  to.resize(members.size());
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    const vec3 position = receivers.position(members[k]);
+    to.sourceX[k] = position.x, to.sourceY[k] = position.y, to.sourceZ[k] = position.z;
+  }
+}
+
 /// Marks the groups that particles or receivers need; false where there are too many.
 bool markGroups(GridTile& tile) {
   const GridParticles& p = tile.particles;
@@ -65,10 +87,17 @@ void GridParticles::resize(std::size_t size, std::size_t channels) {
   growTo(firstBin, size), growTo(lastBin, size);
 }
 
-void GridTile::place(const TilePlace& where, const dvec3& somewhere) {
-  frame = shape->faces[where.face];
-  firstColumn = where.column * shape->tileCells, firstRow = where.row * shape->tileCells;
-  const dvec3 offset = somewhere - frame.origin;
+void GridTile::setUp(const Octree& tree, const Receivers& from, const GridPlan& plan, const GridPlan::Tile& planned,
+                     const GridShape& all, layout::uint kernel) {
+  const std::span<const std::uint32_t> members = plan.receivers(planned);
+  shape = &all, falloff = kernel;
+  channels = tree.channels();
+  receivers = members.size(), receiversAreParticles = plan.receiversAreSlots;
+  fetchParticles(tree, plan.particles(planned), *this);
+  if (!receiversAreParticles) fetchReceivers(from, members, *this);
+  frame = shape->faces[planned.place.face];
+  firstColumn = planned.place.column * shape->tileCells, firstRow = planned.place.row * shape->tileCells;
+  const dvec3 offset = dvec3(from.position(members.front())) - frame.origin;
   const double depth = frame.perspective ? glm::length(offset) : glm::dot(offset, frame.axis);
   for (bin = shape->resolution.bin;; bin *= 2) {
     depthBase = std::floor(depth / bin);
@@ -76,6 +105,9 @@ void GridTile::place(const TilePlace& where, const dvec3& somewhere) {
     if (!receiversAreParticles) placePoints(*this, otherPoints);
     if (markGroups(*this)) break;
   }
+}
+
+void GridTile::allotNodes() {
   for (std::size_t channel = 0; channel < channels; ++channel)
     nodes[channel].assign(static_cast<std::size_t>(stride) * static_cast<std::size_t>(stride * run) + kGridBatch, 0.0f);
 }

@@ -2,6 +2,8 @@
 //
 // Nodes stand [row][column][bin]: a kernel adds to a few short runs of bins, and a ray's depths lie side by side.
 #pragma once
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -83,9 +85,12 @@ struct GridTile {
   int stride = 0;               ///< nodes of a row
   std::vector<float> nodes[3];  ///< at first what lies in each bin, then the optical depth up to its end
 
-  /// Places everything about a point [scene units] where a receiver is, and allots the nodes. Bins are made longer, by
-  /// twos, where a tile is so deep that its nodes would take more than 64 MiB.
-  void place(const TilePlace& where, const dvec3& somewhere);
+  /// Takes what a tile of a plan has from the tree, and places everything. Bins are made longer, by twos, where a tile
+  /// is so deep that its nodes would take more than 64 MiB.
+  void setUp(const Octree& tree, const Receivers& receivers, const GridPlan& plan, const GridPlan::Tile& planned,
+             const GridShape& all, layout::uint kernel);
+  /// Makes the nodes, all 0.
+  void allotNodes();
 
   std::size_t node(int column, int row) const {
     return static_cast<std::size_t>((row + kNodeMargin) * stride + column + kNodeMargin) *
@@ -98,11 +103,41 @@ struct GridTile {
   }
 };
 
+/// Nodes across of the window that a particle goes through a batch with; 0: it is not put down, kAlone: alone.
+constexpr int kAlone = kMostWindow + 1;
+inline int windowOf(const GridParticles& p, std::size_t i) {
+  if (!(p.half[i] > 0)) return 0;
+  const float nodes = std::max(std::ceil(2 * p.half[i]), 2.0f);
+  const bool alone =
+      nodes > kMostWindow || p.curved[i] > 0 || (p.lastBin[i] >> 2) - (p.firstBin[i] >> 2) >= kMostGroups;
+  return alone ? kAlone : static_cast<int>(nodes);
+}
+
+/// How far from its centre a kernel that is not curved has nodes: 1 for a tent, else the greater half width of its
+/// ellipse. `window`: windowOf.
+inline float reachOf(const GridParticles& p, std::size_t i, int window) {
+  if (window == 2) return 1;
+  if (window != kAlone) return p.half[i];
+  return std::sqrt(std::max(p.a[i], p.c[i]) / (p.a[i] * p.c[i] - 0.25f * (p.b[i] * p.b[i])));
+}
+
+/// Of a particle that goes alone: the nodes that its kernel covers, whether the tile has them or not, what its weights
+/// are multiplied with for a peak of 1 (0: it is not put down), and GridParticles::own.
+struct LoneKernel {
+  int firstColumn = 0, firstRow = 0, columns = 0, rows = 0;
+  float scale = 0, own = 0;
+};
+
 /// The steps on vectors, the same bits on every instruction set.
 /// Places of points, bins included.
 void placePoints(const GridTile& tile, GridPoints& points);
 /// Places of particles and their kernels.
 void placeParticles(GridTile& tile);
+LoneKernel weighAlone(const GridTile& tile, std::size_t particle);
+/// For who puts them down elsewhere: `scale`, what the weights of each are multiplied with for a peak of 1, and
+/// GridParticles::own. Those that are curved or reach farther than kMostReach are left out, for weighAlone.
+constexpr float kMostReach = 32;
+void weighTile(GridTile& tile, std::vector<float>& scale);
 /// Puts the kernels down, on nodes that are all 0, and sums along the depth.
 void fillTile(GridTile& tile);
 /// Optical depths of all receivers, [channel][receiver].

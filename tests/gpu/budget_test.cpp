@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "engine/passes/depth_order.h"
+#include "engine/passes/light_grid_pass.h"
 #include "engine/passes/light_pass.h"
 #include "engine/passes/part_size.h"
 #include "engine/rasterizer.h"
@@ -345,6 +346,30 @@ TEST_F(Budget, TreeThatWouldFitWithoutItsRaysIsCut) {
   for (std::size_t i = 0; i < host.size(); ++i)
     worst = std::max(worst, std::abs(std::exp(-double(got[i])) - std::exp(-double(host[i]))));
   EXPECT_LE(worst, 2e-5);
+}
+
+TEST_F(Budget, LightsByAGridInBatchesToTheSameBits) {
+  std::vector<vec3> position;
+  for (std::size_t i = 0; i < 30000; ++i) {
+    Random r(19, i);
+    position.emplace_back(r.direction() * std::cbrt(r.uniform()));
+  }
+  const std::vector<float> radius(position.size(), 0.03f), peak(position.size(), 0.02f), half(position.size(), 0.01f);
+  for (const bool colours : {false, true}) {
+    const Octree tree =
+        colours ? buildOctree({position, radius, peak, half, peak}) : buildOctree(position, radius, peak);
+    const auto lit = [&](const Device& device) {
+      LightGridPass pass(device);
+      return pass.opticalDepths(tree, slotsOf(tree), pointLight({2, 3, 1}), {}, {0.004, 0.03});
+    };
+    const std::vector<float> whole = lit(device());
+    for (const bool stageAlways : {false, true}) {
+      const SmallDevice small(12u << 20, stageAlways);
+      EXPECT_EQ(lit(small.device()), whole);
+    }
+    const Gpu least(DeviceOptions{.validate = true, .memory = {.bytes = 256u << 10}});
+    EXPECT_THROW(lit(least.device()), MachineError);  // not even a tile fits
+  }
 }
 
 }  // namespace

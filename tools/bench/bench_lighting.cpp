@@ -1,9 +1,10 @@
 // mote bench lighting: a noise cloud lit by one point light: build of the octree, then the exact optical depths on TBB
-// against plain packets (equal radii, and radii over a decade) and in the compute shader.
+// against plain packets (equal radii, and radii over a decade) and in the compute shader, and the light grid on both.
 #include <tbb/parallel_sort.h>
 
 #include <cmath>
 
+#include "engine/passes/light_grid_pass.h"
 #include "engine/passes/light_pass.h"
 #include "host/core/parallel.h"
 #include "host/core/random.h"
@@ -22,7 +23,11 @@ constexpr std::uint64_t kScalarMost = 20'000;  // particles lit on the scalar pa
 
 constexpr double kRadiusRange = 10;  // greatest / least, where radii vary
 
-constexpr double kMostBuildSeconds = 0.2, kLeastRays = 1.0, kLeastAgainstPlain = 2.5, kMostRatio = 5;  // the floors
+constexpr double kMostBuildSeconds = 0.2, kLeastRays = 1.0, kLeastAgainstPlain = 2.5, kMostRatio = 5,
+                 kMostGridRatio = 3;  // the floors
+
+// Cells of light grids [radii]: about the coarsest that an error asks for, and a fine one.
+constexpr double kGridCells[] = {1.0, 0.35};
 
 /// The build, with the sort of as many numbers beside it: a yardstick of the machine's speed at that moment.
 Octree timeBuild(Bench& bench, const BenchCloud& cloud) {
@@ -80,6 +85,35 @@ void addFloors(Bench& bench, const Comparison& times) {
     bench.addFloor({"lighting in compute / on TBB [time]", median(times.ratios()), kMostRatio});
 }
 
+/// CPU seconds of B over those of A, run by run: both use all threads, and others' load disturbs these least.
+std::vector<double> coreRatios(const Comparison& times) {
+  std::vector<double> ratios;
+  for (std::size_t run = 0; run < times.timesB.core.size(); ++run)
+    ratios.push_back(times.timesB.core[run] / times.timesA.core[run]);
+  return ratios;
+}
+
+void lightGrids(Bench& bench, const Octree& tree, const layout::Light& light, const LightingOptions& options) {
+  if (!bench.device()) return;
+  LightGridPass pass(*bench.device());
+  const double radius = tree.radius.front(), distance = glm::length(light.position);  // equal radii about the origin
+  for (const double cell : kGridCells) {
+    const GridResolution resolution{cell * radius / distance, 2 * cell * radius};
+    const std::string name = fmt::format("light grid, cells of {:g} radi{}", cell, cell == 1 ? "us" : "i");
+    std::vector<float> onHost, onDevice;
+    const Contender host{"light grid on TBB",
+                         [&] { onHost = gridOpticalDepths(tree, slotsOf(tree), light, options, resolution); }};
+    const Contender compute{"light grid in compute on the device",
+                            [&] { onDevice = pass.opticalDepths(tree, slotsOf(tree), light, options, resolution); }};
+    const LightingOptions exact{.cutoff = 0};  // neither stops early: rounding alone may differ
+    const Comparison* times =
+        bench.compare(name, "rays", host, compute, [&] { return sameLight(onHost, onDevice, light, exact); });
+    if (times)
+      bench.addFloor(
+          {fmt::format("{}: in compute / on TBB [CPU time]", name), median(coreRatios(*times)), kMostGridRatio});
+  }
+}
+
 void againstPlainPackets(Bench& bench, const std::string& name, const BenchCloud& cloud, const layout::Light& light,
                          const LightingOptions& options) {
   const Octree tree = cloud.tree();
@@ -122,6 +156,7 @@ void benchLighting(Bench& bench) {
                           [&] { return scalarCheck(bench.count(), light, options); });
   }
   if (times) addFloors(bench, *times);
+  lightGrids(bench, tree, light, options);
 }
 
 }  // namespace mote

@@ -1,0 +1,80 @@
+// A tile of a light grid as the device takes it: particles by blocks of nodes and bins (shaders/glsl/layout/grid.h).
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "host/lighting/grid_tile.h"
+#include "shaders/glsl/layout/grid.h"
+
+namespace mote {
+
+/// What kernels of a strand are; a strand with several kinds has all their bits.
+enum GridKernelKinds : std::uint32_t { kTentKernels = 1, kEllipseKernels = 2, kCurvedKernels = 4 };
+
+/// Everything that dispatches read, of one tile.
+struct GridArrays {
+  /// Pieces of strands, which go through the device together.
+  struct Pieces {
+    std::uint32_t round = 0;  ///< after those of earlier rounds
+    std::uint32_t kinds = 0;
+    std::vector<layout::GridStrand> strands;
+  };
+
+  std::vector<layout::GridKernel> kernels;
+  std::vector<float> peaks[3];  ///< of the kernels, where there are three channels
+  std::vector<std::uint32_t> entries;
+  std::vector<layout::GridBlock> blocks;
+  std::vector<Pieces> pieces;  ///< by round, then by kinds
+  std::vector<layout::GridEntryPair> table;
+  std::vector<layout::GridReceiver> receivers;
+  std::vector<float> own[3];       ///< of the receivers: what each finds of its own particle
+  std::uint32_t storedBlocks = 0;  ///< without the one of zeros
+
+  std::size_t strands() const;
+};
+
+/// The arrays of a tile alone; holds on to its memory from tile to tile. A piece of a strand has as many steps as a
+/// shader may take, `mostSteps`: one a block, and one for each `lanes` of its particles. Linear in particles and in the
+/// blocks that they touch.
+class GridBlocks {
+ public:
+  /// `tile` is set up, and is weighed here; `members` are its receivers, `slots` its particles.
+  void setUp(GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
+             std::span<const std::uint32_t> slots, std::uint32_t lanes, std::uint32_t mostSteps);
+  const GridArrays& arrays() const { return arrays_; }
+
+ private:
+  struct Entry {
+    std::uint32_t block, kernel;  // block: with its group, as in start_
+  };
+  void setKernels(GridTile& tile);
+  void sortEntries();
+  void setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint32_t mostSteps);
+  void setReceivers(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
+                    std::span<const std::uint32_t> slots);
+
+  GridArrays arrays_;
+  std::size_t groups_ = 0;
+  std::vector<float> scale_;          // of the tile's particles
+  std::vector<Entry> found_;          // particle by particle
+  std::vector<std::uint32_t> start_;  // [block][group]: of entries
+  std::vector<std::uint32_t> kinds_;  // [block]
+};
+
+/// Where the arrays of several tiles go, one behind the other; the device's own memory, perhaps.
+struct GridTargets {
+  std::span<layout::GridKernel> kernels;
+  std::span<float> peaks;  ///< [channel][kernel]; none where there is one channel
+  std::span<std::uint32_t> entries;
+  std::span<layout::GridBlock> blocks;
+  std::span<layout::GridEntryPair> table;
+  std::span<layout::GridReceiver> receivers;
+  std::span<float> own;  ///< [channel][receiver]
+};
+/// Puts the arrays of tiles behind one another, numbers set right. Spans are as long as the tiles' arrays together.
+void join(std::span<const GridArrays* const> tiles, std::size_t channels, const GridTargets& to);
+/// … and the pieces of their strands.
+std::vector<GridArrays::Pieces> joinPieces(std::span<const GridArrays* const> tiles);
+
+}  // namespace mote

@@ -1,0 +1,86 @@
+// The light grid in compute shaders: mote::gridOpticalDepths (host/lighting/light_grid.h) on the device.
+//
+// The host plans the tiles, places particles and receivers, in double, weighs the kernels in the same step, and sorts
+// each tile's particles by the blocks of 4 × 4 nodes and 4 bins that their kernels touch (grid_blocks.h). The device
+// puts them down and sums along the depth (grid_fill.comp, a subgroup for all blocks over the same nodes), and reads
+// what the receivers find (grid_read.comp). Blocks that no particle touches are not stored. The two dispatches are what
+// grows with a finer grid. Sums of weights are left to the host, as it has the kernels in its vectors anyhow: on
+// lavapipe a shader of its own took four times as long, mostly to load them.
+//
+// This suits hardware: a kernel is loaded once for 64 multiply-adds on sums in registers, strands go by subgroups,
+// thousands of them at once; stores are side by side; there is no atomic, shared memory or barrier of a workgroup, so
+// sums are always in the same order. (So it should; it was measured on lavapipe alone.)
+#pragma once
+#include <array>
+#include <map>
+#include <vector>
+
+#include "engine/passes/grid_blocks.h"
+#include "engine/vulkan/device.h"
+#include "host/lighting/light_grid.h"
+
+namespace mote {
+
+class LightGridPass {
+ public:
+  /// `device` must outlive the pass.
+  explicit LightGridPass(const Device& device);
+
+  /// As mote::gridOpticalDepths, T within 2e-5 of it; the same bits each time on devices with subgroups of one size,
+  /// whatever their budget. Tiles go through the device in batches of about 64 MiB, or what the budget leaves of it,
+  /// but one at least: throws MachineError where a single tile does not fit. Each takes there 32 bytes a particle (44
+  /// with three channels), 4 for each block that it touches, 20 a receiver (28), and 512 a block that is touched; on
+  /// the host three times as much while a batch is prepared. About three times the CPU time of gridOpticalDepths on
+  /// lavapipe.
+  std::vector<float> opticalDepths(const Octree& tree, const Receivers& receivers, const layout::Light& light,
+                                   const LightingOptions& options, const GridResolution& resolution,
+                                   std::span<const std::uint8_t> reached = {}, const RaysDone& done = {});
+
+  /// Device seconds of all opticalDepths calls so far, from timestamps.
+  double deviceSeconds() const { return deviceSeconds_; }
+  /// Gives back to the device's budget, and to the host, what the last opticalDepths needed; the next takes it again.
+  void release() { buffers_ = {}, works_ = {}; }
+
+ private:
+  struct FillVariant {
+    layout::uint falloff;
+    std::uint32_t kinds;
+    bool goesOn, colours;
+    auto operator<=>(const FillVariant&) const = default;
+  };
+  struct Buffers {
+    Buffer kernels, peaks, entries, blocks, strands, stored, table, receivers, depths;
+    std::array<Buffer*, 9> all() {
+      return {&kernels, &peaks, &entries, &blocks, &strands, &stored, &table, &receivers, &depths};
+    }
+  };
+  /// Bytes of each, in that order.
+  using Sizes = std::array<std::uint64_t, 9>;
+  /// A tile that is set up.
+  struct Work {
+    const GridPlan::Tile* planned;
+    GridBlocks blocks;
+  };
+
+  const ComputePipeline& fill(const FillVariant& variant);
+  /// The block of zeros.
+  static constexpr Sizes kNoTiles{0, 0, 0, 0, 0, layout::kBlockPairs * sizeof(layout::GridPair), 0, 0, 0};
+  static Sizes sizesOf(const GridArrays& arrays, std::size_t channels);
+  static Sizes sum(const Sizes& a, const Sizes& b);
+  bool fits(const Sizes& sizes);
+  void makeRoom(const Sizes& sizes);
+  /// Optical depths of all receivers, [channel][receiver].
+  std::vector<float> run(std::span<const GridArrays* const> tiles, std::size_t channels, layout::uint falloff,
+                         double cell);
+
+  const Device& device_;
+  TimestampQueries queries_;
+  std::uint32_t groupSize_, storeLanes_;
+  std::map<FillVariant, ComputePipeline> fills_;
+  ComputePipeline read_;
+  Buffers buffers_;
+  std::vector<Work> works_;
+  double deviceSeconds_ = 0;
+};
+
+}  // namespace mote

@@ -1,0 +1,127 @@
+// Puts kernels down on the light grid and sums along the depth: one subgroup a strand, all groups of bins over 4 × 4 nodes.
+//
+// A lane takes a particle of its own to all 16 nodes and 4 bins; the 64 sums stay in its registers until the block's
+// particles are through. Then they are added up over the lanes, always in the same order, and on what the blocks before
+// left. So a particle is loaded once for 64 multiply-adds, stores are side by side, and there is no atomic nor barrier.
+//
+// On lavapipe (Mesa 22.3) a load inside of a loop takes about 90 instructions for each component of a subgroup, which is
+// why a block is that large; loops over nodes and bins must unroll, or the sums live in memory.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#extension GL_EXT_control_flow_attributes : require
+#include "lib/grid.glsl"
+
+layout(constant_id = 1) const uint kFalloff = 0;
+layout(constant_id = 2) const bool kTents = true;     // there may be kernels that are tents …
+layout(constant_id = 3) const bool kEllipses = true;  // … or have a falloff on the light's plane …
+layout(constant_id = 4) const bool kCurved = true;    // … or near a point light
+layout(constant_id = 5) const bool kGoesOn = false;   // the strand's first block has sums already
+layout(constant_id = 6) const uint kStoreLanes = 4;   // at most as many as a subgroup has lanes; divides 16
+layout(constant_id = 7) const bool kColours = false;
+
+#include "lib/falloff.glsl"
+
+const uint kChunks = kBlockNodes / kStoreLanes;
+const uint kMostChunks = kBlockNodes;
+const uint kKernelPairs = 4;  // of a GridKernel
+
+float sum[kBlockNodes * kBlockBins];  // of the lane's particles, [bin][row][column]
+float carry[kMostChunks];             // the lane's nodes of each chunk: what lies before the block
+
+/// Share of a particle that lies before its centre plus x radii of depth.
+float depthShare(float x) {
+  const float a = min(abs(x), 1.0), a2 = a * a;
+  const float part = 0.9 * a - 0.5 * (a2 * a) + 0.1 * (a2 * a2 * a2);
+  return x < 0.0 ? 0.5 - part : 0.5 + part;
+}
+
+float weightAt(GridKernel p, float dx, float dy, float bdy, float cdy2, vec2 uv) {
+  const float tent = kTents ? max(1.0 - abs(dx), 0.0) * max(1.0 - abs(dy), 0.0) : 0.0;
+  if (!kEllipses && !kCurved) return tent;
+  float q = (p.a * dx + bdy) * dx + cdy2;
+  if (kCurved) {
+    const float across = dx * uv.y - dy * uv.x;
+    q = p.c < 0.0 ? p.a * (dx * dx + dy * dy + across * across) / (1.0 + uv.x * uv.x + uv.y * uv.y) : q;
+  }
+  const float value = falloff(q, kFalloff);
+  return kTents && p.c == 0.0 ? tent : value;
+}
+
+/// Only what the variant needs: each load costs.
+GridKernel kernelAt(uint i) {
+  WordPairBuffer words = WordPairBuffer(params.kernels);
+  const uint first = i * kKernelPairs;
+  const vec2 xy = loadFloats(words, first), along = loadFloats(words, first + 1), c = loadFloats(words, first + 3);
+  const vec2 ab = kEllipses || kCurved ? loadFloats(words, first + 2) : vec2(0);
+  const float scale = kColours ? c.y * params.peaks.at[i] : c.y;
+  return GridKernel(xy.x, xy.y, along.x, along.y, ab.x, ab.y, c.x, scale);
+}
+
+void addParticle(GridKernel p, GridStrand strand, float bin) {
+  float share[kBlockBins];
+  float before = depthShare((bin - p.depth) * p.inverseRadius);
+  [[unroll]] for (uint k = 0; k < kBlockBins; ++k) {
+    const float after = depthShare((bin + float(k + 1) - p.depth) * p.inverseRadius);
+    share[k] = p.scale * (after - before);
+    before = after;
+  }
+  [[unroll]] for (uint r = 0; r < kBlockEdge; ++r) {
+    const float dy = (strand.row + float(r)) - p.y, bdy = p.b * dy, cdy2 = p.c * (dy * dy);
+    [[unroll]] for (uint c = 0; c < kBlockEdge; ++c) {
+      const float dx = (strand.column + float(c)) - p.x;
+      const vec2 uv = vec2(strand.u + float(c) * params.cell, strand.v + float(r) * params.cell);
+      const float at = weightAt(p, dx, dy, bdy, cdy2, uv);
+      [[unroll]] for (uint k = 0; k < kBlockBins; ++k) sum[(k * kBlockEdge + r) * kBlockEdge + c] += at * share[k];
+    }
+  }
+}
+
+/// The sums over the lanes, added to what lies before; the next block begins where this one ends.
+void storeBlock(uint stored, bool goesOn) {
+  WordPairBuffer words = WordPairBuffer(params.stored);
+  const uint lane = gl_SubgroupInvocationID, to = stored * kBlockPairs + min(lane, kStoreLanes - 1);
+  [[unroll]] for (uint chunk = 0; chunk < kChunks; ++chunk) {
+    float sums = 0.0;
+    [[unroll]] for (uint k = 0; k < kBlockBins; ++k) {
+      const uint node = k * kBlockNodes + chunk * kStoreLanes;
+      vec2 edges = vec2(carry[chunk]);
+      if (kGoesOn && goesOn) edges = loadFloats(words, to + node);
+      edges.x += sums;
+      float total = 0.0;
+      [[unroll]] for (uint j = 0; j < kStoreLanes; ++j) {
+        const float one = subgroupAdd(sum[node + j]);
+        total = lane == j ? one : total;
+      }
+      sums += total;
+      edges.y += sums;
+      if (lane < kStoreLanes) words.at[to + node] = pack64(floatBitsToUint(edges));
+      if (k == kBlockBins - 1) carry[chunk] = edges.y;
+    }
+  }
+}
+
+void main() {
+  const uint s = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_NumSubgroups + gl_SubgroupID;
+  if (s >= params.count) return;
+  const GridStrand strand = params.strands.at[s];
+  [[unroll]] for (uint chunk = 0; chunk < kChunks; ++chunk) carry[chunk] = 0.0;
+  uint b = strand.first;
+  do {
+    const GridBlock block = params.blocks.at[b];
+    [[unroll]] for (uint j = 0; j < kBlockNodes * kBlockBins; ++j) sum[j] = 0.0;
+    uint at = block.first + gl_SubgroupInvocationID;
+    const uint last = block.end - 1;
+    uint begin = block.first;
+    do {
+      const uint i = params.entries.at[min(at, last)];
+      GridKernel kernel = kernelAt(i);
+      kernel.scale = at <= last ? kernel.scale : 0.0;
+      addParticle(kernel, strand, block.bin);
+      at += gl_SubgroupSize, begin += gl_SubgroupSize;
+    } while (begin <= last);
+    storeBlock(block.stored, b == strand.first);
+    ++b;
+  } while (b < strand.end);
+}
