@@ -64,6 +64,19 @@ void setReceivers(const GridTile& tile, const Receivers& receivers, std::span<co
   }
 }
 
+/// Strands of a tile's middle are longer than those of its edge, and lavapipe gives each thread one run of workgroups:
+/// short runs are mixed, so that any part of the list takes about as long as another of its length.
+void mix(std::vector<layout::GridStrand>& strands) {
+  constexpr std::size_t kRun = layout::kTileBlocks,
+                        kStep = 79;  // a prime: every run once unless it divides their number
+  const std::size_t runs = strands.size() / kRun;
+  if (runs % kStep == 0) return;
+  const std::vector<layout::GridStrand> old = strands;
+  for (std::size_t run = 0; run < runs; ++run)
+    std::copy_n(old.begin() + static_cast<std::ptrdiff_t>(run * kStep % runs * kRun), kRun,
+                strands.begin() + static_cast<std::ptrdiff_t>(run * kRun));
+}
+
 }  // namespace
 
 std::size_t GridArrays::strands() const {
@@ -212,6 +225,7 @@ std::vector<GridArrays::Pieces> joinPieces(std::span<const GridArrays* const> ti
     }
     blocks += static_cast<std::uint32_t>(tile->blocks.size());
   }
+  for (GridArrays::Pieces& pieces : all) mix(pieces.strands);
   return all;
 }
 
