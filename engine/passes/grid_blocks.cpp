@@ -42,6 +42,41 @@ GridArrays::Pieces& piecesOf(std::vector<GridArrays::Pieces>& all, std::uint32_t
   return *all.insert(at, {round, kinds, {}});
 }
 
+void setReceivers(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
+                  std::span<const std::uint32_t> slots, GridArrays& to) {
+  const GridPoints& points = tile.receiverPoints();
+  const GridParticles& p = tile.particles;
+  to.receivers.resize(members.size());
+  for (std::size_t c = 0; c < tile.channels; ++c) to.own[c].assign(members.size(), 0.0f);
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    const std::int32_t bin = points.bin[k];
+    to.receivers[k] = {points.x[k], points.y[k], points.depth[k] - static_cast<float>(bin),
+                       static_cast<layout::uint>(numberOf(tile, bin >> 2)) * (kBlocks * layout::kBlockBins) +
+                           static_cast<layout::uint>(bin & (kGroupBins - 1))};
+    std::size_t self = k;
+    if (!tile.receiversAreParticles) {
+      const std::uint32_t slot = receivers.selfOf(members[k]);
+      const auto at = std::lower_bound(slots.begin(), slots.end(), slot);
+      if (at == slots.end() || *at != slot) continue;
+      self = static_cast<std::size_t>(at - slots.begin());
+    }
+    for (std::size_t c = 0; c < tile.channels; ++c) to.own[c][k] = p.peak[c][self] * p.own[self];
+  }
+}
+
+/// Strands of a tile's middle are longer than those of its edge, and lavapipe gives each thread one run of workgroups:
+/// short runs are mixed, so that any part of the list takes about as long as another of its length.
+void mix(std::vector<layout::GridStrand>& strands) {
+  constexpr std::size_t kRun = layout::kTileBlocks,
+                        kStep = 79;  // a prime: every run once unless it divides their number
+  const std::size_t runs = strands.size() / kRun;
+  if (runs % kStep == 0) return;
+  const std::vector<layout::GridStrand> old = strands;
+  for (std::size_t run = 0; run < runs; ++run)
+    std::copy_n(old.begin() + static_cast<std::ptrdiff_t>(run * kStep % runs * kRun), kRun,
+                strands.begin() + static_cast<std::ptrdiff_t>(run * kRun));
+}
+
 }  // namespace
 
 std::size_t GridArrays::strands() const {
@@ -51,21 +86,22 @@ std::size_t GridArrays::strands() const {
 }
 
 void GridBlocks::setUp(GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
-                       std::span<const std::uint32_t> slots, std::uint32_t lanes, std::uint32_t mostSteps) {
+                       std::span<const std::uint32_t> slots, std::uint32_t lanes, std::uint32_t mostSteps,
+                       GridArrays& to) {
   groups_ = static_cast<std::size_t>(*std::max_element(tile.groupAt.begin(), tile.groupAt.end())) / kGroupBins;
   weighTile(tile, scale_);
-  setKernels(tile);
-  sortEntries();
-  setBlocks(tile, lanes, mostSteps);
-  setReceivers(tile, receivers, members, slots);
+  setKernels(tile, to);
+  sortEntries(to);
+  setBlocks(tile, lanes, mostSteps, to);
+  setReceivers(tile, receivers, members, slots, to);
 }
 
-void GridBlocks::setKernels(GridTile& tile) {
+void GridBlocks::setKernels(GridTile& tile, GridArrays& to) {
   GridParticles& p = tile.particles;
   const std::size_t count = p.points.count;
   const auto cell = static_cast<float>(tile.shape->resolution.cell);
   const int lastGroup = tile.firstGroup + static_cast<int>(tile.groupAt.size()) - 1;
-  arrays_.kernels.resize(count);
+  to.kernels.resize(count);
   // Beyond the end: what `put` below looks at in vain.
   start_.assign((kBlocks + layout::kTileBlocks + 2) * groups_ + 2, 0);
   kinds_.assign(kBlocks + layout::kTileBlocks + 2, 0);
@@ -73,9 +109,9 @@ void GridBlocks::setKernels(GridTile& tile) {
   std::size_t found = 0;
   const bool colours = tile.channels > 1;
   for (std::size_t c = 0; colours && c < tile.channels; ++c)
-    arrays_.peaks[c].assign(p.peak[c].begin(), p.peak[c].begin() + static_cast<std::ptrdiff_t>(count));
+    to.peaks[c].assign(p.peak[c].begin(), p.peak[c].begin() + static_cast<std::ptrdiff_t>(count));
   for (std::size_t i = 0; i < count; ++i) {
-    layout::GridKernel& kernel = arrays_.kernels[i] = {};
+    layout::GridKernel& kernel = to.kernels[i] = {};
     const int window = windowOf(p, i);
     if (window == 0) {
       p.own[i] = 0;
@@ -119,31 +155,30 @@ void GridBlocks::setKernels(GridTile& tile) {
       for (std::uint32_t column = 0; column < columnCount; ++column)
         for (std::uint32_t group = 0; group < groups; ++group) put(row, column, group, true);
   }
-  arrays_.entries.resize(found);
+  to.entries.resize(found);
 }
 
-void GridBlocks::sortEntries() {
+void GridBlocks::sortEntries(GridArrays& to) {
   // Counts stand two places on, then beginnings one place on, which become ends and so the next one's beginnings.
   start_.resize(kBlocks * groups_ + 2);
   for (std::size_t k = 2; k < start_.size(); ++k) start_[k] += start_[k - 1];
-  for (std::size_t k = 0; k < arrays_.entries.size(); ++k)
-    arrays_.entries[start_[found_[k].block + 1]++] = found_[k].kernel;
+  for (std::size_t k = 0; k < to.entries.size(); ++k) to.entries[start_[found_[k].block + 1]++] = found_[k].kernel;
 }
 
-void GridBlocks::setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint32_t mostSteps) {
+void GridBlocks::setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint32_t mostSteps, GridArrays& to) const {
   std::vector<float> binOf(groups_);
   for (std::size_t k = 0; k < tile.groupAt.size(); ++k)
     if (tile.groupAt[k] >= 0)
       binOf[static_cast<std::size_t>(tile.groupAt[k] / kGroupBins - 1)] =
           static_cast<float>((tile.firstGroup + static_cast<int>(k)) * kGroupBins);
-  arrays_.blocks.clear(), arrays_.pieces.clear();
-  arrays_.table.resize(kBlocks * groups_);
-  arrays_.storedBlocks = 0;
+  to.blocks.clear(), to.pieces.clear();
+  to.table.resize(kBlocks * groups_);
+  to.storedBlocks = 0;
   const double cell = tile.shape->resolution.cell;
   for (std::size_t b = 0; b < kBlocks; ++b) {
     const std::size_t column = b % layout::kTileBlocks * layout::kBlockEdge,
                       row = b / layout::kTileBlocks * layout::kBlockEdge;
-    layout::GridStrand strand{static_cast<layout::uint>(arrays_.blocks.size()),
+    layout::GridStrand strand{static_cast<layout::uint>(to.blocks.size()),
                               0,
                               static_cast<float>(column),
                               static_cast<float>(row),
@@ -151,51 +186,29 @@ void GridBlocks::setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint3
                               static_cast<float>((tile.firstRow + static_cast<double>(row)) * cell)};
     std::uint32_t round = 0, steps = 0, last = 0;
     const auto finish = [&] {
-      strand.end = static_cast<layout::uint>(arrays_.blocks.size());
-      if (strand.end > strand.first) piecesOf(arrays_.pieces, round++, kinds_[b]).strands.push_back(strand);
+      strand.end = static_cast<layout::uint>(to.blocks.size());
+      if (strand.end > strand.first) piecesOf(to.pieces, round++, kinds_[b]).strands.push_back(strand);
       strand.first = strand.end, steps = 0;
     };
     for (std::size_t g = 0; g < groups_; ++g) {
       std::uint32_t first = start_[b * groups_ + g];
       const std::uint32_t end = start_[b * groups_ + g + 1];
-      if (first < end) last = 2 * ++arrays_.storedBlocks;
+      if (first < end) last = 2 * ++to.storedBlocks;
       const std::uint32_t entry = last + (first < end ? 1 : 0);
-      arrays_.table[g * kBlocks + b].here = entry;
-      if (b > 0) arrays_.table[g * kBlocks + b - 1].right = entry;
+      to.table[g * kBlocks + b].here = entry;
+      if (b > 0) to.table[g * kBlocks + b - 1].right = entry;
       while (first < end) {
         const std::uint32_t here = std::min(end - first, (mostSteps - steps - 1) * lanes);
-        arrays_.blocks.push_back({first, first + here, arrays_.storedBlocks, binOf[g]});
+        to.blocks.push_back({first, first + here, to.storedBlocks, binOf[g]});
         first += here, steps += 1 + (here + lanes - 1) / lanes;
         if (steps + 2 > mostSteps && (first < end || g + 1 < groups_)) {
           finish();
           // A piece that goes on begins with the last one's block, for what is left of it, or for nothing.
-          if (first == end) arrays_.blocks.push_back({end, end, arrays_.storedBlocks, binOf[g]}), steps = 2;
+          if (first == end) to.blocks.push_back({end, end, to.storedBlocks, binOf[g]}), steps = 2;
         }
       }
     }
     finish();
-  }
-}
-
-void GridBlocks::setReceivers(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
-                              std::span<const std::uint32_t> slots) {
-  const GridPoints& points = tile.receiverPoints();
-  const GridParticles& p = tile.particles;
-  arrays_.receivers.resize(members.size());
-  for (std::size_t c = 0; c < tile.channels; ++c) arrays_.own[c].assign(members.size(), 0.0f);
-  for (std::size_t k = 0; k < members.size(); ++k) {
-    const std::int32_t bin = points.bin[k];
-    arrays_.receivers[k] = {points.x[k], points.y[k], points.depth[k] - static_cast<float>(bin),
-                            static_cast<layout::uint>(numberOf(tile, bin >> 2)) * (kBlocks * layout::kBlockBins) +
-                                static_cast<layout::uint>(bin & (kGroupBins - 1))};
-    std::size_t self = k;
-    if (!tile.receiversAreParticles) {
-      const std::uint32_t slot = receivers.selfOf(members[k]);
-      const auto at = std::lower_bound(slots.begin(), slots.end(), slot);
-      if (at == slots.end() || *at != slot) continue;
-      self = static_cast<std::size_t>(at - slots.begin());
-    }
-    for (std::size_t c = 0; c < tile.channels; ++c) arrays_.own[c][k] = p.peak[c][self] * p.own[self];
   }
 }
 
@@ -212,6 +225,7 @@ std::vector<GridArrays::Pieces> joinPieces(std::span<const GridArrays* const> ti
     }
     blocks += static_cast<std::uint32_t>(tile->blocks.size());
   }
+  for (GridArrays::Pieces& pieces : all) mix(pieces.strands);
   return all;
 }
 

@@ -34,27 +34,23 @@ struct GridArrays {
   std::size_t strands() const;
 };
 
-/// The arrays of a tile alone; holds on to its memory from tile to tile. A piece of a strand has as many steps as a
+/// Makes the arrays of a tile; holds on to its memory from tile to tile. A piece of a strand has as many steps as a
 /// shader may take, `mostSteps`: one a block, and one for each `lanes` of its particles. Linear in particles and in the
 /// blocks that they touch.
 class GridBlocks {
  public:
   /// `tile` is set up, and is weighed here; `members` are its receivers, `slots` its particles.
   void setUp(GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
-             std::span<const std::uint32_t> slots, std::uint32_t lanes, std::uint32_t mostSteps);
-  const GridArrays& arrays() const { return arrays_; }
+             std::span<const std::uint32_t> slots, std::uint32_t lanes, std::uint32_t mostSteps, GridArrays& to);
 
  private:
   struct Entry {
     std::uint32_t block, kernel;  // block: with its group, as in start_
   };
-  void setKernels(GridTile& tile);
-  void sortEntries();
-  void setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint32_t mostSteps);
-  void setReceivers(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
-                    std::span<const std::uint32_t> slots);
+  void setKernels(GridTile& tile, GridArrays& to);
+  void sortEntries(GridArrays& to);
+  void setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint32_t mostSteps, GridArrays& to) const;
 
-  GridArrays arrays_;
   std::size_t groups_ = 0;
   std::vector<float> scale_;          // of the tile's particles
   std::vector<Entry> found_;          // particle by particle

@@ -10,8 +10,8 @@
 namespace mote {
 namespace {
 
-/// Particles and receivers of the tiles that are set up together.
-constexpr std::size_t kMostItems = std::size_t{1} << 18;
+/// Particles and receivers of the tiles that are set up together: of so many that all threads are busy to the end.
+constexpr std::size_t kMostItems = std::size_t{1} << 20;
 /// Of all arrays of a batch.
 constexpr std::uint64_t kBatchBytes = std::uint64_t{64} << 20;
 /// Of a shader's loops: lavapipe ends them after 65535 altogether.
@@ -184,12 +184,12 @@ std::vector<float> LightGridPass::opticalDepths(const Octree& tree, const Receiv
   // A batch's depths to the receivers they belong to.
   const auto finish = [&](std::size_t first, std::size_t last) {
     std::vector<const GridArrays*> parts;
-    for (std::size_t w = first; w < last; ++w) parts.push_back(&works_[w].blocks.arrays());
+    for (std::size_t w = first; w < last; ++w) parts.push_back(&works_[w].arrays);
     const std::vector<float> found = run(parts, channels, options.falloff, resolution.cell);
     const std::size_t all = found.size() / channels;
     std::vector<std::size_t> start(last - first + 1, 0);
     for (std::size_t w = first; w < last; ++w)
-      start[w - first + 1] = start[w - first] + works_[w].blocks.arrays().receivers.size();
+      start[w - first + 1] = start[w - first] + works_[w].arrays.receivers.size();
     parallelBlocks(last - first, 1, [&](std::size_t k, std::size_t) {
       static thread_local std::vector<float> read;
       const Work& work = works_[first + k];
@@ -213,14 +213,15 @@ std::vector<float> LightGridPass::opticalDepths(const Octree& tree, const Receiv
     parallelBlocks(end - begin, 1, [&](std::size_t k, std::size_t) {
       const GridPlan::Tile& planned = plan.tiles[begin + k];
       static thread_local GridTile tile;
+      static thread_local GridBlocks blocks;
       tile.setUp(tree, receivers, plan, planned, shape, options.falloff);
       works_[k].planned = &planned;
-      works_[k].blocks.setUp(tile, receivers, plan.receivers(planned), plan.particles(planned),
-                             device_.leastSubgroupSize(), kMostSteps);
+      blocks.setUp(tile, receivers, plan.receivers(planned), plan.particles(planned), device_.leastSubgroupSize(),
+                   kMostSteps, works_[k].arrays);
     });
     for (std::size_t first = 0, last = 0; first < end - begin; first = last) {
       const auto with = [&](const Sizes& sizes, std::size_t w) {
-        return sum(sizes, sizesOf(works_[w].blocks.arrays(), channels));
+        return sum(sizes, sizesOf(works_[w].arrays, channels));
       };
       Sizes sizes = with(kNoTiles, last++);
       for (; last < end - begin && fits(with(sizes, last)); ++last) sizes = with(sizes, last);

@@ -59,7 +59,7 @@ class LightGridPass {
   /// A tile that is set up.
   struct Work {
     const GridPlan::Tile* planned;
-    GridBlocks blocks;
+    GridArrays arrays;
   };
 
   const ComputePipeline& fill(const FillVariant& variant);
