@@ -28,7 +28,7 @@ struct KernelMoments {
 KernelMoments kernelMoments(layout::uint falloff);
 
 /// Along a tile's edge: wide enough that few particles lie in several, and their nodes still pass through the caches.
-constexpr int kTileCells = 64;
+constexpr int kTileCells = 32;
 
 /// What all tiles of a grid share.
 struct GridShape {

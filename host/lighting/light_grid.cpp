@@ -1,5 +1,7 @@
 #include "host/lighting/light_grid.h"
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <algorithm>
 
 #include "host/core/error.h"
@@ -44,9 +46,14 @@ std::vector<float> gridOpticalDepths(const Octree& tree, const Receivers& receiv
   const GridShape shape = gridShape(light, resolution, options.falloff);
   const GridPlan plan = planGrid(tree, receivers, shape, reached);
   const float slack = columnRules(tree, light, receivers.bounds()).slack;
+  // Of each thread, and gone with this call: hundreds of bytes for each particle of a tile.
+  struct Workspace {
+    GridTile tile;
+    std::vector<float> read;
+  };
+  tbb::enumerable_thread_specific<Workspace> workspaces;
   parallelBlocks(plan.tiles.size(), 1, [&](std::size_t t, std::size_t) {
-    static thread_local GridTile tile;
-    static thread_local std::vector<float> read;
+    auto& [tile, read] = workspaces.local();
     const std::span<const std::uint32_t> members = plan.receivers(plan.tiles[t]), slots = plan.particles(plan.tiles[t]);
     tile.setUp(tree, receivers, plan, plan.tiles[t], shape, options.falloff);
     tile.allotNodes();

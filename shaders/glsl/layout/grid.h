@@ -12,7 +12,7 @@ MOTE_CONST uint kBlockEdge = 4u;   // nodes along a block's edge
 MOTE_CONST uint kBlockNodes = 16u;
 MOTE_CONST uint kBlockBins = 4u;
 MOTE_CONST uint kBlockPairs = 64u;
-MOTE_CONST uint kTileBlocks = 17u;   // along the edge of a tile of 65 nodes
+MOTE_CONST uint kTileBlocks = 9u;    // along the edge of a tile of 33 nodes
 
 // A particle's kernel: weights F(q) with q = a·Δx² + b·Δx·Δy + c·Δy² in nodes. Where c is 0 it is a tent over a cell.
 // Where it is −1 the light is near, and q = a · (Δx² + Δy² + (Δx·v − Δy·u)²) / n with (u, v) of the node, n = 1 + u² + v².
