@@ -10,6 +10,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/cache_control.h>
 #include <hwy/highway.h>
+#include "host/lighting/falloff-inl.h"
 // clang-format on
 
 HWY_BEFORE_NAMESPACE();
@@ -232,20 +233,6 @@ void choose(const Column& column, std::size_t channels, Beam& beam) {
 
 // ---- sum
 
-template <layout::uint kFalloff>
-HWY_INLINE Vec falloffOf(Vec q) {
-  const Vec one = hn::Set(kTag, 1.0f), zero = hn::Zero(kTag);
-  if constexpr (kFalloff == layout::kFalloffLinear) {
-    return hn::Max(hn::Sub(one, hn::Sqrt(q)), zero);
-  } else {
-    const Vec u = hn::Max(hn::Sub(one, q), zero);
-    if constexpr (kFalloff == layout::kFalloffSphere)
-      return hn::Sqrt(u);
-    else
-      return hn::Mul(u, u);
-  }
-}
-
 HWY_INLINE Vec capOf(Vec t, Vec halfChord) {
   const Vec x = hn::Min(hn::Max(hn::Div(t, hn::Max(halfChord, hn::Set(kTag, 1e-30f))), hn::Set(kTag, -1.0f)),
                         hn::Set(kTag, 1.0f));
@@ -257,7 +244,7 @@ template <layout::uint kFalloff>
 HWY_INLINE Vec softShare(Vec q, Vec t, float radius, float inverseRadius) {
   const Vec s = hn::Sqrt(hn::Max(hn::Sub(hn::Set(kTag, 1.0f), q), hn::Zero(kTag)));
   if constexpr (kFalloff != layout::kFalloffSmooth) {
-    return hn::Mul(falloffOf<kFalloff>(q), capOf(t, hn::Mul(hn::Set(kTag, radius), s)));
+    return hn::Mul(falloffOf<kFalloff>(kTag, q), capOf(t, hn::Mul(hn::Set(kTag, radius), s)));
   } else {
     const Vec x = hn::Min(hn::Max(hn::Mul(t, hn::Set(kTag, inverseRadius)), hn::Sub(hn::Zero(kTag), s)), s);
     const Vec sum = hn::Add(s, x);
@@ -330,7 +317,8 @@ class PacketSum {
   }
 
   HWY_INLINE void addBetween(std::size_t k) {
-    for (int v = 0; v < kVectors; ++v) addShare(v, beam_.particles.peak, k, falloffOf<kFalloff>(separation(v, k)));
+    for (int v = 0; v < kVectors; ++v)
+      addShare(v, beam_.particles.peak, k, falloffOf<kFalloff>(kTag, separation(v, k)));
   }
 
   HWY_INLINE void addNearStart(std::size_t k, std::uint32_t index) {
@@ -351,7 +339,8 @@ class PacketSum {
         share = softShare<kFalloff>(q, t, radius, inverseRadius);
       } else {
         const Vec back = hn::Min(t, hn::Zero(kTag));
-        share = falloffOf<kFalloff>(hn::Add(q, hn::Mul(hn::Mul(back, back), hn::Set(kTag, inverseSquareOf(radius)))));
+        share =
+            falloffOf<kFalloff>(kTag, hn::Add(q, hn::Mul(hn::Mul(back, back), hn::Set(kTag, inverseSquareOf(radius)))));
       }
       addShare(v, beam_.particles.peak, k, notSelf(v, slot, share));
     }
@@ -371,7 +360,7 @@ class PacketSum {
       if constexpr (kEndpoint == layout::kEndpointClamp) s = hn::Min(hn::Max(s, hn::Zero(kTag)), length);
       const Vec ex = hn::Sub(x, hn::Mul(s, dx)), ey = hn::Sub(y, hn::Mul(s, dy)), ez = hn::Sub(z, hn::Mul(s, dz));
       const Vec q = hn::Mul(dot3(ex, ey, ez, ex, ey, ez), hn::Set(kTag, inverseSquareOf(radius)));
-      Vec share = falloffOf<kFalloff>(q);
+      Vec share = falloffOf<kFalloff>(kTag, q);
       if constexpr (kEndpoint == layout::kEndpointSoft) {
         const Vec halfChord =
             hn::Mul(hn::Set(kTag, radius), hn::Sqrt(hn::Max(hn::Sub(hn::Set(kTag, 1.0f), q), hn::Zero(kTag))));
@@ -424,10 +413,10 @@ HWY_INLINE Vec shareAtStart(Vec q, Vec t, Vec radius) {
   const Vec zero = hn::Zero(kTag);
   if constexpr (kEndpoint == layout::kEndpointClamp) {
     const Vec back = hn::Div(hn::Min(t, zero), radius);
-    return falloffOf<kFalloff>(hn::Add(q, hn::Mul(back, back)));
+    return falloffOf<kFalloff>(kTag, hn::Add(q, hn::Mul(back, back)));
   } else {
     const Vec s = hn::Sqrt(hn::Max(hn::Sub(hn::Set(kTag, 1.0f), q), zero));
-    return hn::Mul(falloffOf<kFalloff>(q), capOf(t, hn::Mul(radius, s)));
+    return hn::Mul(falloffOf<kFalloff>(kTag, q), capOf(t, hn::Mul(radius, s)));
   }
 }
 

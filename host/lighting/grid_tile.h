@@ -103,8 +103,8 @@ struct GridTile {
   }
 };
 
-/// Nodes across of the window that a particle goes through a batch with; 0: it is not put down, kAlone: alone.
 constexpr int kAlone = kMostWindow + 1;
+/// Nodes across of the window that a particle goes through a batch with; 0: it is not put down, kAlone: alone.
 inline int windowOf(const GridParticles& p, std::size_t i) {
   if (!(p.half[i] > 0)) return 0;
   const float nodes = std::max(std::ceil(2 * p.half[i]), 2.0f);
@@ -134,6 +134,8 @@ void placePoints(const GridTile& tile, GridPoints& points);
 /// Places of particles and their kernels.
 void placeParticles(GridTile& tile);
 LoneKernel weighAlone(const GridTile& tile, std::size_t particle);
+/// Puts one that goes alone down, on the tile's nodes.
+void putDownAlone(GridTile& tile, std::size_t particle);
 /// For who puts them down elsewhere: `scale`, what the weights of each are multiplied with for a peak of 1, and
 /// GridParticles::own. Those that are curved or reach farther than kMostReach are left out, for weighAlone.
 constexpr float kMostReach = 32;
