@@ -1,19 +1,13 @@
 """tools/bench/plot_figures.py and plot.py on a report whose times are known."""
-import contextlib
 import csv
 import io
-import json
 import os
-import sys
-import tempfile
 import unittest
 import xml.etree.ElementTree
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools", "bench"))
-import plot  # noqa: E402
-import plot_figures  # noqa: E402
-
-SVG = "{http://www.w3.org/2000/svg}"
+from plot_case import SVG, PlotCase
+import plot
+import plot_figures
 
 
 def stages(seconds):
@@ -41,22 +35,8 @@ REPORT = {"benchmark": "figures", "runs": [
     point(31, "share & more", 100, [5, 5], [20, 20]), point(31, "share & more", 50, [4, 3], [10, 10])]}
 
 
-class PlotFiguresTest(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = folder.name
-
-    def path(self, name):
-        return os.path.join(self.folder, name)
-
-    def plot(self, report, *flags):
-        with open(self.path("report.json"), "w", encoding="utf-8") as file:
-            file.write(report if isinstance(report, str) else json.dumps(report))
-        out, err = io.StringIO(), io.StringIO()
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            code = plot_figures.main(self.path("report.json"), *flags)
-        return code, out.getvalue(), err.getvalue()
+class PlotFiguresTest(PlotCase):
+    script = plot_figures
 
     def rows(self, report):
         code, out, err = self.plot(report)

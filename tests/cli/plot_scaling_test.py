@@ -1,16 +1,12 @@
 """tools/bench/plot_scaling.py on a report whose times are known."""
-import contextlib
 import csv
 import io
-import json
 import os
-import sys
-import tempfile
 import unittest
 import xml.etree.ElementTree
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools", "bench"))
-import plot_scaling  # noqa: E402
+from plot_case import SVG, PlotCase
+import plot_scaling
 
 
 def run(series, count, seconds_a, ratio, passed=True):
@@ -25,22 +21,8 @@ REPORT = {"benchmark": "scaling", "runs": [run("grid", 2000, [9e-5, 1e-4], 2), r
                                            run("grid", 4000, [1e-4, 2e-4], 6)]}
 
 
-class PlotScalingTest(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = folder.name
-
-    def path(self, name):
-        return os.path.join(self.folder, name)
-
-    def plot(self, report, *flags):
-        with open(self.path("report.json"), "w", encoding="utf-8") as file:
-            file.write(report if isinstance(report, str) else json.dumps(report))
-        out, err = io.StringIO(), io.StringIO()
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            code = plot_scaling.main(self.path("report.json"), *flags)
-        return code, out.getvalue(), err.getvalue()
+class PlotScalingTest(PlotCase):
+    script = plot_scaling
 
     def test_TableHasTheTimePerParticleOfEachCloud(self):
         code, out, err = self.plot(REPORT)
@@ -59,21 +41,21 @@ class PlotScalingTest(unittest.TestCase):
         self.assertEqual((code, out), (0, ""))
         self.assertTrue(os.path.getsize(self.path("plot.csv")) > 0)
         root = xml.etree.ElementTree.parse(self.path("plot.svg")).getroot()
-        lines = root.findall("{http://www.w3.org/2000/svg}polyline")
+        lines = root.findall(SVG + "polyline")
         self.assertEqual(len(lines), 2)
         points = [tuple(map(float, point.split(","))) for point in lines[0].get("points").split()]
         self.assertEqual(len(points), 3)
         self.assertAlmostEqual(points[1][0] - points[0][0], points[2][0] - points[1][0], delta=0.2)  # doublings
         self.assertEqual(points[0][1], points[1][1])
         self.assertLess(points[2][1], points[1][1])
-        self.assertIn("ns per particle", [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")])
-        self.assertIn("grid & co", [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")])
+        self.assertIn("ns per particle", [text.text for text in root.iter(SVG + "text")])
+        self.assertIn("grid & co", [text.text for text in root.iter(SVG + "text")])
 
     def test_PlotsCpuTimeWhereThatIsAskedFor(self):
         self.plot(REPORT, "--svg", self.path("plot.svg"), "--csv", self.path("plot.csv"), "--cpu")
         root = xml.etree.ElementTree.parse(self.path("plot.svg")).getroot()
-        self.assertIn("CPU ns per particle", [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")])
-        points = root.find("{http://www.w3.org/2000/svg}polyline").get("points").split()
+        self.assertIn("CPU ns per particle", [text.text for text in root.iter(SVG + "text")])
+        points = root.find(SVG + "polyline").get("points").split()
         heights = [float(point.split(",")[1]) for point in points]
         self.assertLess(heights[1], heights[0])
         self.assertEqual(heights[2], heights[0])

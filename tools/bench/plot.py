@@ -1,11 +1,21 @@
-"""Plots of lines and points as SVG, for the reports of `mote bench`. Standard library only."""
+"""What the scripts that plot reports of `mote bench` share: plots of lines and points as SVG, tables as CSV, and the
+way from a command line to the files it asks for. Standard library only."""
+import argparse
+import csv
+import io
+import json
 import math
+import sys
 from xml.sax.saxutils import escape
 
 WIDTH, HEIGHT = 640, 400
 LEFT, RIGHT, TOP, BOTTOM = 70, 190, 20, 50  # margins; the right one holds the legend
 COLOURS = ["#1b6ca8", "#c0392b", "#2e7d32", "#7b1fa2"]
 DECADE = 10  # from this range on an axis is logarithmic
+
+
+class ReportError(Exception):
+    """What is wrong with a report; run() prints it."""
 
 
 def number_text(value):
@@ -91,3 +101,34 @@ def to_svg(x_axis, y_axis, series):
         line(WIDTH - RIGHT + 12, at - 4, WIDTH - RIGHT + 32, at - 4, colour)
         text(WIDTH - RIGHT + 38, at, name, "start")
     return "\n".join(parts + ["</svg>"]) + "\n"
+
+
+def to_csv(columns, rows):
+    out = io.StringIO()
+    csv.writer(out, lineterminator="\n").writerows([columns, *rows])
+    return out.getvalue()
+
+
+def run(script, description, outputs, files_of, arguments):
+    """The main function of `script`. `outputs`: (flag, metavar, help) of each; `files_of(report, options)`:
+    {path: text}, the text of None is printed. Returns the exit code: 0, 2 where a file cannot be read or written or is
+    no such report."""
+    parser = argparse.ArgumentParser(description=description.splitlines()[0])
+    parser.add_argument("report", metavar="REPORT.json")
+    for flag, metavar, words in outputs:
+        parser.add_argument(flag, metavar=metavar, help=words)
+    parser.add_argument("--cpu", action="store_true", help="plot CPU time over all threads")
+    options = parser.parse_args(arguments)
+    try:
+        with open(options.report, encoding="utf-8") as file:
+            files = files_of(json.load(file), options)
+        for path, text in files.items():
+            if path is None:
+                sys.stdout.write(text)
+                continue
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(text)
+    except (OSError, ValueError, ReportError) as error:
+        print("%s: %s: %s" % (script, options.report, error), file=sys.stderr)
+        return 2
+    return 0

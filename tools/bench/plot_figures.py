@@ -11,10 +11,6 @@ least.
 time. A point whose pictures differed was not timed and is left out. Standard library only.
 Exit code: 0, 2 where the report is not one of `mote bench figures` or has not been timed.
 """
-import argparse
-import csv
-import io
-import json
 import os
 import statistics
 import sys
@@ -23,10 +19,6 @@ import plot
 
 COLUMNS = ["figure", "axis", "x", "backend", "stage", "seconds", "seconds_min", "seconds_max", "ratio"]
 STAGES = ["octree", "lighting", "sort", "splat"]  # and "total" and "cpu", of the whole frame
-
-
-class ReportError(Exception):
-    pass
 
 
 def times_of(run):
@@ -45,7 +37,8 @@ def figures_of(report):
     """{figure: (title, axis, rows as COLUMNS has them)}, points in the report's order."""
     try:
         if report["benchmark"] != "figures":
-            raise ReportError("a report of bench figures is wanted, this is one of mote bench " + report["benchmark"])
+            raise plot.ReportError("a report of bench figures is wanted, this is one of mote bench "
+                                   + report["benchmark"])
         figures, first = {}, {}
         for run in report["runs"]:
             if not run["check"]["passed"]:
@@ -59,20 +52,15 @@ def figures_of(report):
                 rows.append([number, axis, x, backend, stage, statistics.median(seconds), min(seconds), max(seconds),
                              ratio])
     except (KeyError, TypeError, ZeroDivisionError, statistics.StatisticsError) as error:
-        raise ReportError("not a report of mote bench figures: %s %s" % (type(error).__name__, error)) from error
+        raise plot.ReportError("not a report of mote bench figures: %s %s" % (type(error).__name__, error)) from error
     if not figures:
-        raise ReportError("nothing was timed")
+        raise plot.ReportError("nothing was timed")
     return figures
 
 
 def to_csv(figures):
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for _, _, rows in figures.values():
-        for row in rows:
-            writer.writerow(row[:2] + ["%.10g" % row[2]] + row[3:5] + ["%.4g" % value for value in row[5:]])
-    return out.getvalue()
+    return plot.to_csv(COLUMNS, (row[:2] + ["%.10g" % row[2]] + row[3:5] + ["%.4g" % value for value in row[5:]]
+                                 for _, _, rows in figures.values() for row in rows))
 
 
 def to_markdown(figures):
@@ -106,35 +94,25 @@ def plot_of(axis, rows, plotted, title):
     return plot.to_svg(x_axis, plot.Axis(title, seconds), {name: sorted(series[name]) for name in sorted(series)})
 
 
+def files_of(report, options):
+    figures = figures_of(report)
+    files = {options.csv: to_csv(figures), options.markdown: to_markdown(figures)}
+    what = {"total": "whole frame", "lighting": "lighting"}, "seconds"
+    if options.cpu:
+        what = {"cpu": "whole frame"}, "CPU seconds over all threads"
+    if options.svg is not None:
+        os.makedirs(options.svg, exist_ok=True)
+        for number, (_, axis, rows) in figures.items():
+            files[os.path.join(options.svg, "figure%d.svg" % number)] = plot_of(axis, rows, *what)
+    files.pop(None, None)
+    return files or {None: to_csv(figures)}
+
+
 def main(*arguments):
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("report", metavar="REPORT.json")
-    parser.add_argument("--csv", metavar="OUT.csv", help="write all rows there")
-    parser.add_argument("--markdown", metavar="OUT.md", help="write tables for a document there")
-    parser.add_argument("--svg", metavar="FOLDER", help="write a plot of each figure there")
-    parser.add_argument("--cpu", action="store_true", help="plot CPU time over all threads")
-    options = parser.parse_args(arguments)
-    try:
-        with open(options.report, encoding="utf-8") as file:
-            figures = figures_of(json.load(file))
-        files = {options.csv: to_csv(figures), options.markdown: to_markdown(figures)}
-        what = {"total": "whole frame", "lighting": "lighting"}, "seconds"
-        if options.cpu:
-            what = {"cpu": "whole frame"}, "CPU seconds over all threads"
-        if options.svg is not None:
-            os.makedirs(options.svg, exist_ok=True)
-            for number, (_, axis, rows) in figures.items():
-                files[os.path.join(options.svg, "figure%d.svg" % number)] = plot_of(axis, rows, *what)
-        files.pop(None, None)
-        if not files:
-            sys.stdout.write(to_csv(figures))
-        for path, content in files.items():
-            with open(path, "w", encoding="utf-8") as file:
-                file.write(content)
-    except (OSError, ValueError, ReportError) as error:
-        print("plot_figures.py: %s: %s" % (options.report, error), file=sys.stderr)
-        return 2
-    return 0
+    outputs = [("--csv", "OUT.csv", "write all rows there"),
+               ("--markdown", "OUT.md", "write tables for a document there"),
+               ("--svg", "FOLDER", "write a plot of each figure there")]
+    return plot.run("plot_figures.py", __doc__, outputs, files_of, arguments)
 
 
 if __name__ == "__main__":

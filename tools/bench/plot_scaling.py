@@ -8,10 +8,6 @@ the smallest, which is the median over the whole report. The columns with cpu ar
 which others on the machine disturb least; --cpu plots that. Standard library only.
 Exit code: 0, 2 where the report is not one of `mote bench scaling` or has not been timed.
 """
-import argparse
-import csv
-import io
-import json
 import math
 import statistics
 import sys
@@ -22,15 +18,12 @@ COLUMNS = ["series", "particles", "ns_per_particle", "relative", "relative_min",
            "cpu_ns_per_particle", "relative_cpu"]
 
 
-class ReportError(Exception):
-    pass
-
-
 def rows_of(report):
     """Rows as COLUMNS has them, series by series, each from its smallest cloud on."""
     try:
         if report["benchmark"] != "scaling":
-            raise ReportError("a report of bench scaling is wanted, this is one of mote bench " + report["benchmark"])
+            raise plot.ReportError("a report of bench scaling is wanted, this is one of mote bench "
+                                   + report["benchmark"])
         series = {}
         for run in report["runs"]:
             if run["check"]["passed"]:
@@ -48,19 +41,14 @@ def rows_of(report):
                 ratio_cpu = core_b / core_a * scale if core_a > 0 else math.nan
                 rows.append([name, run["count"], ratio * wall, ratio, least, most, ratio_cpu * cpu, ratio_cpu])
     except (KeyError, TypeError, IndexError, statistics.StatisticsError) as error:
-        raise ReportError("not a report of mote bench scaling: %s %s" % (type(error).__name__, error)) from error
+        raise plot.ReportError("not a report of mote bench scaling: %s %s" % (type(error).__name__, error)) from error
     if not rows:
-        raise ReportError("nothing was timed")
+        raise plot.ReportError("nothing was timed")
     return rows
 
 
 def to_csv(rows):
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for row in rows:
-        writer.writerow(row[:2] + ["%.4g" % value for value in row[2:]])
-    return out.getvalue()
+    return plot.to_csv(COLUMNS, (row[:2] + ["%.4g" % value for value in row[2:]] for row in rows))
 
 
 def plot_of(rows, column="ns_per_particle"):
@@ -73,27 +61,18 @@ def plot_of(rows, column="ns_per_particle"):
     return plot.to_svg(x_axis, plot.Axis(title, [row[value] for row in rows], log=True), series)
 
 
+def files_of(report, options):
+    rows = rows_of(report)
+    files = {options.csv: to_csv(rows)}
+    if options.svg is not None:
+        files[options.svg] = plot_of(rows, "cpu_ns_per_particle" if options.cpu else "ns_per_particle")
+    return files
+
+
 def main(*arguments):
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("report", metavar="REPORT.json")
-    parser.add_argument("--csv", metavar="OUT.csv", help="write the table there; else it is printed")
-    parser.add_argument("--svg", metavar="OUT.svg", help="write the plot there")
-    parser.add_argument("--cpu", action="store_true", help="plot CPU time over all threads")
-    options = parser.parse_args(arguments)
-    try:
-        with open(options.report, encoding="utf-8") as file:
-            rows = rows_of(json.load(file))
-        if options.csv is None:
-            sys.stdout.write(to_csv(rows))
-        picture = plot_of(rows, "cpu_ns_per_particle" if options.cpu else "ns_per_particle")
-        for path, content in ((options.csv, to_csv(rows)), (options.svg, picture)):
-            if path is not None:
-                with open(path, "w", encoding="utf-8") as file:
-                    file.write(content)
-    except (OSError, ValueError, ReportError) as error:
-        print("plot_scaling.py: %s: %s" % (options.report, error), file=sys.stderr)
-        return 2
-    return 0
+    outputs = [("--csv", "OUT.csv", "write the table there; else it is printed"),
+               ("--svg", "OUT.svg", "write the plot there")]
+    return plot.run("plot_scaling.py", __doc__, outputs, files_of, arguments)
 
 
 if __name__ == "__main__":
