@@ -554,32 +554,5 @@ TEST_F(MoteRender, ASignalIsExitCode130AndLeavesOnlyWholePictures) {
   }
 }
 
-TEST(RenderCommand, SaysHowEachLightKeptTheErrorInStatsAndHeader) {
-  const test::TempFolder folder;
-  test::writeBytes(folder.file("cloud.json"), R"({
-    "particles": [{"generate": "cloud", "count": 60000}],
-    "lights": [{"name": "key", "position": [2, 3, 1]}, {"name": "fill", "position": [-2, 0, 1], "casts_shadows": false}],
-    "lighting": {"error": 0.02}, "output": {"size": [64, 36]}})");
-  const std::string stats = folder.file("stats.json"), picture = folder.file("cloud.exr");
-  const test::ProcessResult result = test::mote(
-      {"render", folder.file("cloud.json"), "-o", picture, "--lighting", "cpu", "--raster", "cpu", "--stats", stats},
-      test::kWithoutVulkan);
-  ASSERT_EQ(result.exitCode, 0) << result.err;
-  const nlohmann::json found = nlohmann::json::parse(readBytes(stats))["frames"][0]["light_error"];
-  ASSERT_EQ(found.size(), 2u);
-  const nlohmann::json& key = found[0];
-  EXPECT_EQ(key["light"], "key");
-  EXPECT_EQ(key["method"], "light_grid");
-  EXPECT_NEAR(key["allowed"].get<double>(), 0.02, 1e-8);
-  EXPECT_GT(key["cell"].get<double>(), 0);
-  EXPECT_GT(key["mean"].get<double>(), 0);
-  EXPECT_LE(key["mean"].get<double>(), key["upper"].get<double>());
-  EXPECT_LE(key["upper"].get<double>(), 0.02 + 1e-8);
-  EXPECT_LE(key["p99"].get<double>(), key["max"].get<double>());
-  EXPECT_EQ(key["probes"], 2048);
-  EXPECT_EQ(found[1]["method"], "exact");
-  EXPECT_TRUE(contains(readBytes(picture), "light_grid"));
-}
-
 }  // namespace
 }  // namespace mote
