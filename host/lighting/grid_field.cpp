@@ -132,7 +132,7 @@ void GridField::sum() {
 }
 
 std::vector<GridPatch> patchesOfLoners(const GridField& field, const Octree& tree, const GridShape& shape,
-                                       std::span<const std::uint32_t> slots) {
+                                       std::span<const Loner> loners) {
   struct Entry {
     std::size_t face;
     int row, column;  // of patches
@@ -140,17 +140,14 @@ std::vector<GridPatch> patchesOfLoners(const GridField& field, const Octree& tre
     auto place() const { return std::tuple(face, row, column); }
   };
   std::vector<Entry> entries;
-  for (const std::uint32_t slot : slots)
-    for (std::size_t f = 0; f < shape.faces.size(); ++f) {
-      const LightFrame& frame = shape.faces[f];
-      const dvec3 centre = dvec3(tree.position(slot)) - frame.origin;
-      if (frame.perspective && !(glm::dot(centre, frame.axis) > kLeastCosine / 2 * glm::length(centre))) continue;
-      const NodeBox box(nodeRange(centre, tree.radius[slot], frame, shape), field.faces[f]);
-      if (box.left > box.right || box.top > box.bottom) continue;
-      for (int row = box.top / kLonerNodes; row <= box.bottom / kLonerNodes; ++row)
-        for (int column = box.left / kLonerNodes; column <= box.right / kLonerNodes; ++column)
-          entries.push_back({f, row, column, slot});
-    }
+  for (const auto& [f, slot] : loners) {
+    const dvec3 centre = dvec3(tree.position(slot)) - shape.faces[f].origin;
+    const NodeBox box(nodeRange(centre, tree.radius[slot], shape.faces[f], shape), field.faces[f]);
+    if (box.left > box.right || box.top > box.bottom) continue;
+    for (int row = box.top / kLonerNodes; row <= box.bottom / kLonerNodes; ++row)
+      for (int column = box.left / kLonerNodes; column <= box.right / kLonerNodes; ++column)
+        entries.push_back({f, row, column, slot});
+  }
   std::stable_sort(entries.begin(), entries.end(),
                    [](const Entry& a, const Entry& b) { return a.place() < b.place(); });
   std::vector<GridPatch> patches;

@@ -46,9 +46,15 @@ struct GridField {
   std::size_t floats_ = 0;
 };
 
-/// Particles that go alone (grid_tile.h), in patches that have no node in common: each in all that have nodes of it.
+/// A particle that goes alone (grid_tile.h) on a face; on another it may go by batches.
+struct Loner {
+  std::size_t face;
+  std::uint32_t slot;
+};
+
+/// Patches that have no node in common, each loner in all that have nodes of it.
 std::vector<GridPatch> patchesOfLoners(const GridField& field, const Octree& tree, const GridShape& shape,
-                                       std::span<const std::uint32_t> slots);
+                                       std::span<const Loner> loners);
 
 /// Optical depths at points placed on a patch, [channel][point], from a field that is summed; the same bits on every
 /// instruction set.

@@ -124,18 +124,17 @@ void eachApart(std::span<const GridPatch> patches, const Run& run) {
   }
 }
 
-/// Puts a patch down; a particle's own share is left in `depths`. Returns the slots of those that go alone.
-std::vector<std::uint32_t> putDownPatch(const Task& task, const GridPatch& patch, GridField& field, GridTile& tile,
-                                        std::vector<float>& depths) {
-  std::vector<std::uint32_t> alone;
+/// Puts a patch down; a particle's own share is left in `depths`. Returns those that go alone.
+std::vector<Loner> putDownPatch(const Task& task, const GridPatch& patch, GridField& field, GridTile& tile,
+                                std::vector<float>& depths) {
+  std::vector<Loner> alone;
   tile.setUp(task.tree, patch, task.shape, task.options.falloff);
   field.lend(patch, tile);
   putDownBatches(tile);
   GridParticles& p = tile.particles;
   for (const std::uint32_t i : p.alone) {
-    if (!patch.standsOnFace(i)) continue;
-    p.own[i] = weighAlone(tile, i).own;
-    alone.push_back(static_cast<std::uint32_t>(patch.slot(i)));
+    if (patch.standsOnFace(i)) p.own[i] = weighAlone(tile, i).own;
+    alone.push_back({patch.face, static_cast<std::uint32_t>(patch.slot(i))});
   }
   for (std::size_t c = 0; c < tile.channels; ++c)
     eachStanding(patch, [&](std::size_t slot, std::size_t i) {
@@ -147,14 +146,14 @@ std::vector<std::uint32_t> putDownPatch(const Task& task, const GridPatch& patch
 /// All patches into the field.
 void putDown(const Task& task, std::span<const GridPatch> patches, Workspaces& workspaces, GridField& field,
              std::vector<float>& depths) {
-  std::vector<std::vector<std::uint32_t>> alone(patches.size());
+  std::vector<std::vector<Loner>> alone(patches.size());
   eachApart(patches, [&](std::span<const std::uint32_t> set) {
     GridTile& tile = workspaces.local().tile;
     for (const std::uint32_t k : set) alone[k] = putDownPatch(task, patches[k], field, tile, depths);
   });
-  std::vector<std::uint32_t> slots;
-  for (const auto& part : alone) slots.insert(slots.end(), part.begin(), part.end());
-  const std::vector<GridPatch> loners = patchesOfLoners(field, task.tree, task.shape, slots);
+  std::vector<Loner> all;
+  for (const auto& part : alone) all.insert(all.end(), part.begin(), part.end());
+  const std::vector<GridPatch> loners = patchesOfLoners(field, task.tree, task.shape, all);
   parallelBlocks(loners.size(), 1, [&](std::size_t k, std::size_t) {
     GridTile& tile = workspaces.local().tile;
     tile.setUp(task.tree, loners[k], task.shape, task.options.falloff);
