@@ -146,9 +146,8 @@ void putDownOne(GridTile& tile, std::size_t i) {
   p.own[i] = kernel.own;
   if (!(kernel.scale > 0)) return;
   const float scale = kernel.scale, inverse = 1.0f / p.depthRadius[i];
-  const int last = tile.shape->tileCells;
-  const int rowBegin = std::max(f.y0, 0), rowEnd = std::min(f.y0 + f.rows - 1, last);
-  const int columnBegin = std::max(f.x0, 0), columnEnd = std::min(f.x0 + f.columns - 1, last);
+  const int rowBegin = std::max(f.y0, 0), rowEnd = std::min(f.y0 + f.rows - 1, tile.rows);
+  const int columnBegin = std::max(f.x0, 0), columnEnd = std::min(f.x0 + f.columns - 1, tile.columns);
   for (int group = p.firstBin[i] >> 2; group <= p.lastBin[i] >> 2; ++group) {
     const int place = tile.placeOfGroup(group);
     if (place < 0) continue;
@@ -161,8 +160,9 @@ void putDownOne(GridTile& tile, std::size_t i) {
       const Group shares = scaled(share, scale * p.peak[channel][i]);
       for (int y = rowBegin; y <= rowEnd; ++y) {
         const float* weight = &f.values[f.index(columnBegin - f.x0, y - f.y0)];
-        float* to = tile.nodes[channel].data() + tile.node(columnBegin, y) + place;
-        for (int x = columnBegin; x <= columnEnd; ++x, to += tile.run) addTo(to, *weight++, shares);
+        for (int x = columnBegin; x <= columnEnd; ++x, ++weight)
+          if (const std::int32_t node = tile.node(x, y); node != GridTile::kNoNode)
+            addTo(tile.values[channel] + (node + place), *weight, shares);
       }
     }
   }

@@ -108,18 +108,20 @@ HWY_INLINE void putDown(GridTile& tile, const Batch& batch, std::size_t first, s
   const int group = p.firstBin[i] >> 2, place = tile.placeOfGroup(group), next = tile.placeOfGroup(group + 1);
   const bool both = p.lastBin[i] >> 2 > group && next >= 0;
   if (place < 0) return;
-  const std::size_t run = static_cast<std::size_t>(tile.run), row = run * static_cast<std::size_t>(tile.stride);
-  const std::size_t at = tile.node(batch.column[lane], batch.row[lane]) + static_cast<std::size_t>(place);
+  const std::int32_t* corner =
+      tile.nodeAt + static_cast<std::ptrdiff_t>(batch.row[lane]) * tile.pitch + batch.column[lane];
   for (std::size_t channel = 0; channel < tile.channels; ++channel) {
     const float scale = batch.scale[lane] * p.peak[channel][i];
     const Group share = scaled(batch.share[0] + kGroupBins * lane, scale),
                 further = scaled(batch.share[1] + kGroupBins * lane, scale);
-    float* to = tile.nodes[channel].data() + at;
-    for (int r = 0; r < kNodes; ++r, to += row)
+    float* values = tile.values[channel] + place;
+    const std::int32_t* row = corner;
+    for (int r = 0; r < kNodes; ++r, row += tile.pitch)
       for (int c = 0; c < kNodes; ++c) {
         const float weight = batch.weight[r * kNodes + c][lane];
-        addTo(to + static_cast<std::size_t>(c) * run, weight, share);
-        if (both) addTo(to + static_cast<std::size_t>(c) * run + kGroupBins, weight, further);
+        float* to = values + row[c];
+        addTo(to, weight, share);
+        if (both) addTo(to + kGroupBins, weight, further);
       }
   }
 }
@@ -141,6 +143,7 @@ template <layout::uint kFalloff>
 HWY_NOINLINE void fillAll(GridTile& tile) {
   Batch batch;
   GridParticles& p = tile.particles;
+  p.alone.clear();
   for (std::size_t first = 0; first < p.points.count; first += kGridBatch) {
     const std::size_t count = std::min(kGridBatch, p.points.count - first);
     int window[kGridBatch] = {};
@@ -156,7 +159,7 @@ HWY_NOINLINE void fillAll(GridTile& tile) {
     if (any[0] || any[kAlone])
       for (std::size_t lane = 0; lane < count; ++lane) {
         if (window[lane] == 0) p.own[first + lane] = 0;
-        if (window[lane] == kAlone) putDownAlone(tile, first + lane);
+        if (window[lane] == kAlone) p.alone.push_back(static_cast<std::uint32_t>(first + lane));
       }
   }
 }
@@ -178,20 +181,15 @@ HWY_INLINE hn::Vec<GroupTag> sumGroup(float* at, hn::Vec<GroupTag> carry) {
 }
 #endif
 
-/// Every node's run becomes the sums up to each bin's end.
-HWY_NOINLINE void sumRuns(GridTile& tile) {
-  const int size = tile.shape->tileCells;
-  for (std::size_t channel = 0; channel < tile.channels; ++channel)
-    for (int row = 0; row <= size; ++row)
-      for (int column = 0; column <= size; ++column) {
-        float* at = tile.nodes[channel].data() + tile.node(column, row);
+void sumAll(float* nodes, std::size_t count, int run) {
+  for (float* end = nodes + count; nodes < end; nodes += run) {
 #if HWY_TARGET == HWY_SCALAR
-        float carry = 0;
+    float carry = 0;
 #else
-        auto carry = hn::Zero(kGroupTag);
+    auto carry = hn::Zero(kGroupTag);
 #endif
-        for (int bin = 0; bin < tile.run; bin += kGroupBins) carry = sumGroup(at + bin, carry);
-      }
+    for (int bin = 0; bin < run; bin += kGroupBins) carry = sumGroup(nodes + bin, carry);
+  }
 }
 
 void fill(GridTile& tile) {
@@ -200,7 +198,6 @@ void fill(GridTile& tile) {
     case layout::kFalloffSphere: fillAll<layout::kFalloffSphere>(tile); break;
     default: fillAll<layout::kFalloffSmooth>(tile); break;
   }
-  sumRuns(tile);
 }
 
 }  // namespace mote::HWY_NAMESPACE
@@ -210,8 +207,10 @@ HWY_AFTER_NAMESPACE();
 namespace mote {
 
 HWY_EXPORT(fill);
+HWY_EXPORT(sumAll);
 
-void fillTile(GridTile& tile) { HWY_DYNAMIC_DISPATCH(fill)(tile); }
+void putDownBatches(GridTile& tile) { HWY_DYNAMIC_DISPATCH(fill)(tile); }
+void sumRuns(std::span<float> nodes, int run) { HWY_DYNAMIC_DISPATCH(sumAll)(nodes.data(), nodes.size(), run); }
 
 }  // namespace mote
 #endif

@@ -130,6 +130,25 @@ void locateAll(const LocatePoints& points, const GridShape& shape, double* keys,
   for (std::size_t i = 0; i < points.count; i += lanes()) part(i, std::min(lanes(), points.count - i));
 }
 
+void findBounds(const LocatePoints& points, PointBounds& bounds) {
+  const hn::CappedTag<float, 16> tag;
+  const std::size_t lanes = hn::Lanes(tag);
+  const auto range = [&](const float* from) {
+    auto lo = hn::Set(tag, from[0]), hi = lo;
+    std::size_t i = 0;
+    for (; i + lanes <= points.count; i += lanes) {
+      const auto value = hn::LoadU(tag, from + i);
+      lo = hn::Min(lo, value), hi = hn::Max(hi, value);
+    }
+    std::pair<float, float> all{hn::GetLane(hn::MinOfLanes(tag, lo)), hn::GetLane(hn::MaxOfLanes(tag, hi))};
+    for (; i < points.count; ++i) all = {std::min(all.first, from[i]), std::max(all.second, from[i])};
+    return all;
+  };
+  const auto x = range(points.x), y = range(points.y), z = range(points.z);
+  const auto r = points.radius ? range(points.radius) : std::pair<float, float>{};
+  bounds = {{x.first, y.first, z.first}, {x.second, y.second, z.second}, r.first, r.second};
+}
+
 // ---- place
 
 /// The whole number below, held within what an int has.
@@ -218,11 +237,17 @@ HWY_AFTER_NAMESPACE();
 namespace mote {
 
 HWY_EXPORT(locateAll);
+HWY_EXPORT(findBounds);
 HWY_EXPORT(placeAll);
 HWY_EXPORT(placeKernels);
 
 void locate(const LocatePoints& points, const GridShape& shape, double* keys, std::uint8_t* flags) {
   HWY_DYNAMIC_DISPATCH(locateAll)(points, shape, keys, flags);
+}
+PointBounds boundsOf(const LocatePoints& points) {
+  PointBounds bounds;
+  HWY_DYNAMIC_DISPATCH(findBounds)(points, bounds);
+  return bounds;
 }
 void placePoints(const GridTile& tile, GridPoints& points) { HWY_DYNAMIC_DISPATCH(placeAll)(tile, points); }
 void placeParticles(GridTile& tile) { HWY_DYNAMIC_DISPATCH(placeKernels)(tile); }

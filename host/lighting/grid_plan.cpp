@@ -261,7 +261,7 @@ GridPlan planGrid(const Octree& tree, const Receivers& receivers, const GridShap
                   std::span<const std::uint8_t> reached) {
   const Receivers slots = slotsOf(tree);
   GridPlan plan;
-  plan.receiversAreSlots = receivers.self.empty() && receivers.x.data() == slots.x.data();
+  plan.receiversAreSlots = areSlotsOf(tree, receivers);
   const Located particles(slots.x, slots.y, slots.z, tree.radius.data(), shape);
   const Located points = plan.receiversAreSlots ? Located({}, {}, {}, nullptr, shape)
                                                 : Located(receivers.x, receivers.y, receivers.z, nullptr, shape);

@@ -110,4 +110,11 @@ struct LocatePoints {
 /// Keys of tiles and LocateFlags of points; the same bits on every instruction set.
 void locate(const LocatePoints& points, const GridShape& shape, double* keys, std::uint8_t* flags);
 
+/// Bounds of points, 1 … of them; the same on every instruction set.
+struct PointBounds {
+  vec3 lo, hi;
+  float leastRadius, greatestRadius;
+};
+PointBounds boundsOf(const LocatePoints& points);
+
 }  // namespace mote

@@ -29,6 +29,21 @@ void fetchParticles(const Octree& tree, std::span<const std::uint32_t> slots, Gr
   }
 }
 
+void copyRange(const std::vector<float>& from, const GridPatch& patch, std::vector<float>& to) {
+  std::copy(from.begin() + patch.begin, from.begin() + patch.end, to.begin());
+}
+
+/// … what a patch has.
+void fetchParticles(const Octree& tree, const GridPatch& patch, GridTile& tile) {
+  if (!patch.some.empty()) return fetchParticles(tree, patch.some, tile);
+  GridParticles& to = tile.particles;
+  to.resize(patch.count(), tile.channels);
+  copyRange(tree.x, patch, to.points.sourceX), copyRange(tree.y, patch, to.points.sourceY);
+  copyRange(tree.z, patch, to.points.sourceZ), copyRange(tree.radius, patch, to.radius);
+  const std::vector<float>* peaks[] = {&tree.peak, &tree.peakGreen, &tree.peakBlue};
+  for (std::size_t c = 0; c < tile.channels; ++c) copyRange(*peaks[c], patch, to.peak[c]);
+}
+
 void fetchReceivers(const Receivers& receivers, std::span<const std::uint32_t> members, GridTile& tile) {
   GridPoints& to = tile.otherPoints;
   to.resize(members.size());
@@ -67,9 +82,16 @@ bool markGroups(GridTile& tile) {
     if (at == 0) at = kGroupBins * groups++;
   // An odd number, so that neighbouring runs do not share a few lines of the cache.
   tile.run = kGroupBins * (groups | 1);
-  tile.stride = tile.shape->tileCells + 1 + 2 * kNodeMargin;
-  return static_cast<std::size_t>(tile.stride * tile.stride) * static_cast<std::size_t>(tile.run) * sizeof(float) <=
-         kMostTileBytes;
+  return tile.nodeCount() * static_cast<std::size_t>(tile.run) * sizeof(float) <= kMostTileBytes;
+}
+
+/// Where a patch stands.
+void cover(const GridPatch& patch, const GridShape& shape, GridTile& tile) {
+  tile.shape = &shape;
+  tile.frame = shape.faces[patch.face];
+  tile.columns = patch.columns, tile.rows = patch.rows, tile.margin = patch.margin;
+  tile.firstColumn = patch.firstColumn, tile.firstRow = patch.firstRow;
+  tile.bin = shape.resolution.bin, tile.depthBase = patch.firstBin;
 }
 
 }  // namespace
@@ -92,6 +114,7 @@ void GridTile::setUp(const Octree& tree, const Receivers& from, const GridPlan& 
   const std::span<const std::uint32_t> members = plan.receivers(planned);
   shape = &all, falloff = kernel;
   channels = tree.channels();
+  columns = rows = shape->tileCells, margin = kNodeMargin;
   receivers = members.size(), receiversAreParticles = plan.receiversAreSlots;
   fetchParticles(tree, plan.particles(planned), *this);
   if (!receiversAreParticles) fetchReceivers(from, members, *this);
@@ -107,9 +130,50 @@ void GridTile::setUp(const Octree& tree, const Receivers& from, const GridPlan& 
   }
 }
 
+void GridTile::setUp(const Octree& tree, const GridPatch& patch, const GridShape& all, layout::uint kernel) {
+  cover(patch, all, *this);
+  falloff = kernel, channels = tree.channels();
+  receivers = 0, receiversAreParticles = false;
+  fetchParticles(tree, patch, *this);
+  placeParticles(*this);
+  firstGroup = 0;
+  groupAt.resize(static_cast<std::size_t>(patch.bins / kGroupBins));
+  for (std::size_t group = 0; group < groupAt.size(); ++group)
+    groupAt[group] = static_cast<std::int32_t>(group) * kGroupBins;
+}
+
+void GridTile::placeStanding(const Octree& tree, const GridPatch& patch, const GridShape& all) {
+  cover(patch, all, *this);
+  GridPoints& to = otherPoints;
+  to.resize(patch.count());
+  if (patch.some.empty()) {
+    copyRange(tree.x, patch, to.sourceX), copyRange(tree.y, patch, to.sourceY), copyRange(tree.z, patch, to.sourceZ);
+  } else {
+    to.count = 0;
+    for (std::size_t i = 0; i < patch.some.size(); ++i) {
+      if (patch.stands[i] == 0) continue;
+      const vec3 position = tree.position(patch.some[i]);
+      to.sourceX[to.count] = position.x, to.sourceY[to.count] = position.y, to.sourceZ[to.count] = position.z;
+      ++to.count;
+    }
+  }
+  placePoints(*this, to);
+}
+
 void GridTile::allotNodes() {
+  for (std::size_t channel = 0; channel < channels; ++channel) {
+    ownValues_[channel].assign(nodeCount() * static_cast<std::size_t>(run) + kGridBatch, 0.0f);
+    values[channel] = ownValues_[channel].data();
+  }
+  ownNodeAt_.resize(nodeCount());
+  for (std::size_t k = 0; k < ownNodeAt_.size(); ++k) ownNodeAt_[k] = static_cast<std::int32_t>(k) * run;
+  pitch = stride();
+  nodeAt = ownNodeAt_.data() + margin * pitch + margin;
+}
+
+void GridTile::sum() {
   for (std::size_t channel = 0; channel < channels; ++channel)
-    nodes[channel].assign(static_cast<std::size_t>(stride) * static_cast<std::size_t>(stride * run) + kGridBatch, 0.0f);
+    sumRuns({values[channel], nodeCount() * static_cast<std::size_t>(run)}, run);
 }
 
 }  // namespace mote

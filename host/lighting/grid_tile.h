@@ -1,14 +1,15 @@
-// One tile of a light grid, and the steps that fill and read it (light_grid.h).
+// One tile or patch of a light grid, and the steps that fill and read it (light_grid.h).
 //
 // Nodes stand [row][column][bin]: a kernel adds to a few short runs of bins, and a ray's depths lie side by side.
 #pragma once
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
-#include "host/lighting/grid_plan.h"
+#include "host/lighting/grid_patches.h"
 
 namespace mote {
 
@@ -17,7 +18,7 @@ constexpr int kGroupBins = 4;
 /// Kernels on up to so many nodes across and up to so many groups of bins go a vector of particles at a time; others
 /// one by one.
 constexpr int kMostWindow = 8, kMostGroups = 2;
-/// Nodes beyond the tile's on each side, so that such kernels need no clipping: a centre stands up to half a window
+/// Nodes beyond a tile's on each side, so that such kernels need no clipping: a centre stands up to half a window
 /// outside, and its nodes as many from there.
 constexpr int kNodeMargin = kMostWindow;
 /// Particles of a step; arrays have room for one more.
@@ -57,6 +58,8 @@ struct GridParticles {
   std::vector<float> curved;
   /// Share of its peak that a particle finds of itself where it stands.
   std::vector<float> own;
+  /// Those that go alone (kAlone), ascending.
+  std::vector<std::uint32_t> alone;
   void resize(std::size_t size, std::size_t channels);
 };
 
@@ -81,30 +84,48 @@ struct GridTile {
   /// run begins with a group of zeros, what lies before everything.
   int firstGroup = 0;
   std::vector<std::int32_t> groupAt;
-  int run = 0;                  ///< bins of a node
-  int stride = 0;               ///< nodes of a row
-  std::vector<float> nodes[3];  ///< at first what lies in each bin, then the optical depth up to its end
+  int run = 0;                ///< bins of a node of its own
+  int columns = 0, rows = 0;  ///< cells
+  int margin = kNodeMargin;   ///< nodes beyond these on each side
+  /// The runs of all nodes, of each channel: at first what lies in each bin, then the optical depth up to its end. A
+  /// patch has those of its field.
+  float* values[3] = {};
+  /// Where a node's run begins: nodeAt[row · pitch + column] from the corner, up to `margin` before it and behind.
+  const std::int32_t* nodeAt = nullptr;
+  int pitch = 0;
+  static constexpr std::int32_t kNoNode = std::numeric_limits<std::int32_t>::min();
 
   /// Takes what a tile of a plan has from the tree, and places everything. Bins are made longer, by twos, where a tile
   /// is so deep that its nodes would take more than 64 MiB.
   void setUp(const Octree& tree, const Receivers& receivers, const GridPlan& plan, const GridPlan::Tile& planned,
              const GridShape& all, layout::uint kernel);
-  /// Makes the nodes, all 0.
+  /// The same for a patch; it has no receivers.
+  void setUp(const Octree& tree, const GridPatch& patch, const GridShape& all, layout::uint kernel);
+  /// Takes the patch's particles that stand on its face as `otherPoints`, placed.
+  void placeStanding(const Octree& tree, const GridPatch& patch, const GridShape& all);
+  /// Makes nodes of its own, all 0, with runs of one length side by side.
   void allotNodes();
+  /// What lies in each bin becomes the optical depth up to its end.
+  void sum();
 
-  std::size_t node(int column, int row) const {
-    return static_cast<std::size_t>((row + kNodeMargin) * stride + column + kNodeMargin) *
-           static_cast<std::size_t>(run);
+  int stride() const { return columns + 1 + 2 * margin; }
+  std::size_t nodeCount() const {
+    return static_cast<std::size_t>(stride()) * static_cast<std::size_t>(rows + 1 + 2 * margin);
   }
+  std::int32_t node(int column, int row) const { return nodeAt[static_cast<std::ptrdiff_t>(row) * pitch + column]; }
   /// Where the run's bins of a group begin; < 0: left out.
   int placeOfGroup(int group) const {
     const int at = group - firstGroup;
     return at < 0 || at >= static_cast<int>(groupAt.size()) ? -1 : groupAt[static_cast<std::size_t>(at)];
   }
+
+ private:
+  std::vector<float> ownValues_[3];
+  std::vector<std::int32_t> ownNodeAt_;
 };
 
 constexpr int kAlone = kMostWindow + 1;
-/// Nodes across of the window that a particle goes through a batch with; 0: it is not put down, kAlone: alone.
+/// Nodes across of the window that a particle goes through a batch with; 0: it is not put down, kAlone: it goes alone.
 inline int windowOf(const GridParticles& p, std::size_t i) {
   if (!(p.half[i] > 0)) return 0;
   const float nodes = std::max(std::ceil(2 * p.half[i]), 2.0f);
@@ -140,8 +161,10 @@ void putDownAlone(GridTile& tile, std::size_t particle);
 /// GridParticles::own. Those that are curved or reach farther than kMostReach are left out, for weighAlone.
 constexpr float kMostReach = 32;
 void weighTile(GridTile& tile, std::vector<float>& scale);
-/// Puts the kernels down, on nodes that are all 0, and sums along the depth.
-void fillTile(GridTile& tile);
+/// Puts down those that go by batches, and lists those that go alone.
+void putDownBatches(GridTile& tile);
+/// Every node's run of bins becomes the sums up to each bin's end.
+void sumRuns(std::span<float> nodes, int run);
 /// Optical depths of all receivers, [channel][receiver].
 void readTile(const GridTile& tile, std::vector<float>& depths);
 

@@ -29,5 +29,8 @@ inline Receivers slotsOf(const Octree& tree) {
   const std::size_t count = tree.particleCount();
   return {std::span(tree.x).first(count), std::span(tree.y).first(count), std::span(tree.z).first(count), {}};
 }
+inline bool areSlotsOf(const Octree& tree, const Receivers& receivers) {
+  return receivers.self.empty() && receivers.x.data() == tree.x.data() && receivers.size() == tree.particleCount();
+}
 
 }  // namespace mote
