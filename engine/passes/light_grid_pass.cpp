@@ -1,5 +1,7 @@
 #include "engine/passes/light_grid_pass.h"
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <algorithm>
 
 #include "engine/passes/part_size.h"
@@ -38,6 +40,31 @@ class Filling {
 };
 
 }  // namespace
+
+/// What the tiles of one call share, and where their depths go.
+struct LightGridPass::Call {
+  /// Of each thread, and gone with the call: hundreds of bytes for each particle of a tile.
+  struct Workspace {
+    GridTile tile;
+    GridBlocks blocks;
+    std::vector<float> read;
+  };
+
+  const Octree& tree;
+  const Receivers& receivers;
+  const LightingOptions& options;
+  const GridShape& shape;
+  const GridPlan& plan;
+  float slack;  // columnRules
+  const RaysDone& done;
+  std::vector<float> depths;  // [channel][receiver]
+  std::vector<Work> works{};  // of tiles that are set up together; their memory serves the next ones
+  tbb::enumerable_thread_specific<Workspace> workspaces{};
+
+  std::size_t items(const GridPlan::Tile& tile) const {
+    return plan.receivers(tile).size() + plan.particles(tile).size();
+  }
+};
 
 LightGridPass::LightGridPass(const Device& device)
     : device_(device),
@@ -105,65 +132,133 @@ void LightGridPass::makeRoom(const Sizes& sizes) {
   device_.upload<layout::GridPair>(buffers_.stored, std::vector<layout::GridPair>(layout::kBlockPairs));
 }
 
-std::vector<float> LightGridPass::run(std::span<const GridArrays* const> tiles, std::size_t channels,
-                                      layout::uint falloff, double cell) {
-  Sizes sizes = kNoTiles;
-  for (const GridArrays* tile : tiles) sizes = sum(sizes, sizesOf(*tile, channels));
-  makeRoom(sizes);
+std::vector<GridArrays::Pieces> LightGridPass::upload(std::span<const Work> works, const Sizes& sizes,
+                                                      std::size_t channels) {
+  std::vector<const GridArrays*> tiles;
+  for (const Work& work : works) tiles.push_back(&work.arrays);
   const Buffers& to = buffers_;
-  const std::size_t kernels = sizes[0] / sizeof(layout::GridKernel);
-  const std::size_t receivers = sizes[7] / sizeof(layout::GridReceiver);
-  const Filling<layout::GridKernel> kernel(device_, to.kernels, sizes[0]);
+  const Filling<layout::GridKernel> kernels(device_, to.kernels, sizes[0]);
   const Filling<float> peaks(device_, to.peaks, sizes[1]);
   const Filling<std::uint32_t> entries(device_, to.entries, sizes[2]);
   const Filling<layout::GridBlock> blocks(device_, to.blocks, sizes[3]);
   const Filling<layout::GridEntryPair> table(device_, to.table, sizes[6]);
-  const Filling<layout::GridReceiver> receiver(device_, to.receivers, sizes[7]);
+  const Filling<layout::GridReceiver> receivers(device_, to.receivers, sizes[7]);
   const Filling<float> own(device_, to.depths, sizes[8]);
   join(tiles, channels,
-       {kernel.elements, peaks.elements, entries.elements, blocks.elements, table.elements, receiver.elements,
+       {kernels.elements, peaks.elements, entries.elements, blocks.elements, table.elements, receivers.elements,
         own.elements});
-  kernel.finish(), peaks.finish(), entries.finish(), blocks.finish(), table.finish(), receiver.finish(), own.finish();
-  const std::vector<GridArrays::Pieces> all = joinPieces(tiles);
+  kernels.finish(), peaks.finish(), entries.finish(), blocks.finish(), table.finish(), receivers.finish(), own.finish();
+  std::vector<GridArrays::Pieces> all = joinPieces(tiles);
   std::size_t strands = 0;
   for (const GridArrays::Pieces& pieces : all) {
     device_.upload<layout::GridStrand>(to.strands, pieces.strands, strands);
     strands += pieces.strands.size();
   }
+  return all;
+}
+
+layout::GridParams LightGridPass::params(double cell) const {
+  const Buffers& from = buffers_;
   layout::GridParams params{};
-  params.kernels = to.kernels.address(), params.peaks = to.peaks.address();
-  params.entries = to.entries.address(), params.blocks = to.blocks.address();
-  params.stored = to.stored.address(), params.table = to.table.address();
-  params.receivers = to.receivers.address(), params.depths = to.depths.address();
+  params.kernels = from.kernels.address(), params.peaks = from.peaks.address();
+  params.entries = from.entries.address(), params.blocks = from.blocks.address();
+  params.stored = from.stored.address(), params.table = from.table.address();
+  params.receivers = from.receivers.address(), params.depths = from.depths.address();
   params.cell = static_cast<float>(cell);
+  return params;
+}
+
+void LightGridPass::fillNodes(CommandBuffer& commands, std::span<const GridArrays::Pieces> all,
+                              layout::GridParams params, layout::uint falloff, bool colours) {
+  const std::size_t eachGroup = groupSize_ / device_.mostSubgroupSize();
+  params.strands = buffers_.strands.address();
+  std::uint32_t round = 0;
+  for (const GridArrays::Pieces& pieces : all) {
+    if (pieces.round != round) commands.barrier(barrier::computeToCompute);
+    round = pieces.round;
+    params.count = static_cast<layout::uint>(pieces.strands.size());
+    commands.dispatchRow(fill({falloff, pieces.kinds, round > 0, colours}), params,
+                         (pieces.strands.size() + eachGroup - 1) / eachGroup);
+    params.strands += pieces.strands.size() * sizeof(layout::GridStrand);
+  }
+}
+
+std::vector<float> LightGridPass::run(std::span<const Work> works, std::size_t channels, layout::uint falloff,
+                                      double cell) {
+  Sizes sizes = kNoTiles;
+  for (const Work& work : works) sizes = sum(sizes, sizesOf(work.arrays, channels));
+  makeRoom(sizes);
+  const std::vector<GridArrays::Pieces> pieces = upload(works, sizes, channels);
   if (read_.handle() == VK_NULL_HANDLE)
     read_ = device_.createComputePipeline(spirv::grid_read_comp, sizeof(layout::GridParams),
                                           std::array<SpecializationConstant, 1>{{{0, groupSize_}}});
-  const std::size_t eachGroup = groupSize_ / device_.mostSubgroupSize();
+  const std::size_t kernels = sizes[0] / sizeof(layout::GridKernel);
+  const std::size_t receivers = sizes[7] / sizeof(layout::GridReceiver);
+  layout::GridParams of = params(cell);
   queries_.reset();
   device_.run([&](CommandBuffer& commands) {
     const std::uint32_t stage = queries_.begin(commands, "light grid");
     for (std::size_t channel = 0; channel < channels; ++channel) {
-      std::uint64_t strand = to.strands.address();
-      std::uint32_t round = 0;
-      for (const GridArrays::Pieces& pieces : all) {
-        if (pieces.round != round) commands.barrier(barrier::computeToCompute);
-        round = pieces.round;
-        params.strands = strand, params.count = static_cast<layout::uint>(pieces.strands.size());
-        strand += pieces.strands.size() * sizeof(layout::GridStrand);
-        commands.dispatchRow(fill({falloff, pieces.kinds, round > 0, channels > 1}), params,
-                             (pieces.strands.size() + eachGroup - 1) / eachGroup);
-      }
+      fillNodes(commands, pieces, of, falloff, channels > 1);
       commands.barrier(barrier::computeToCompute);
-      params.count = static_cast<layout::uint>(receivers);
-      commands.dispatchRow(read_, params, (receivers + groupSize_ - 1) / groupSize_);
+      of.count = static_cast<layout::uint>(receivers);
+      commands.dispatchRow(read_, of, (receivers + groupSize_ - 1) / groupSize_);
       commands.barrier(barrier::computeToCompute);  // the next channel takes the same nodes
-      params.peaks += kernels * sizeof(float), params.depths += receivers * sizeof(float);
+      of.peaks += kernels * sizeof(float), of.depths += receivers * sizeof(float);
     }
     queries_.end(commands, stage);
   });
   for (const StageTime& stage : queries_.results()) deviceSeconds_ += stage.seconds;
-  return device_.download<float>(to.depths, channels * receivers);
+  return device_.download<float>(buffers_.depths, channels * receivers);
+}
+
+std::span<const LightGridPass::Work> LightGridPass::setUpTiles(Call& call, std::size_t begin) const {
+  const std::vector<GridPlan::Tile>& tiles = call.plan.tiles;
+  std::size_t end = begin, items = 0;
+  while (end < tiles.size() && (end == begin || items + call.items(tiles[end]) <= kMostItems))
+    items += call.items(tiles[end++]);
+  if (call.works.size() < end - begin) call.works.resize(end - begin);
+  parallelBlocks(end - begin, 1, [&](std::size_t k, std::size_t) {
+    auto& [tile, blocks, read] = call.workspaces.local();
+    Work& work = call.works[k];
+    work.planned = &tiles[begin + k];
+    tile.setUp(call.tree, call.receivers, call.plan, *work.planned, call.shape, call.options.falloff);
+    blocks.setUp(tile, call.receivers, call.plan.receivers(*work.planned), call.plan.particles(*work.planned),
+                 device_.leastSubgroupSize(), kMostSteps, work.arrays);
+  });
+  return std::span(call.works).first(end - begin);
+}
+
+std::size_t LightGridPass::batchThatFits(std::span<const Work> works, std::size_t channels) {
+  Sizes sizes = sum(kNoTiles, sizesOf(works.front().arrays, channels));
+  std::size_t count = 1;
+  for (; count < works.size(); ++count) {
+    sizes = sum(sizes, sizesOf(works[count].arrays, channels));
+    if (!fits(sizes)) break;
+  }
+  return count;
+}
+
+void LightGridPass::keep(Call& call, std::span<const Work> works, std::span<const float> found) {
+  const std::size_t channels = call.tree.channels(), all = found.size() / channels;
+  std::vector<std::size_t> start(works.size(), 0);
+  for (std::size_t w = 1; w < works.size(); ++w) start[w] = start[w - 1] + works[w - 1].arrays.receivers.size();
+  parallelBlocks(works.size(), 1, [&](std::size_t w, std::size_t) {
+    std::vector<float>& read = call.workspaces.local().read;
+    const GridPlan::Tile& planned = *works[w].planned;
+    const std::span<const std::uint32_t> members = call.plan.receivers(planned);
+    const std::size_t count = members.size();
+    read.clear();
+    for (std::size_t c = 0; c < channels; ++c) {
+      const std::span<const float> one = found.subspan(c * all + start[w], count);
+      read.insert(read.end(), one.begin(), one.end());
+    }
+    addNearLight(call.tree, call.plan.nearLight, call.shape, planned.place, call.receivers, members, call.options,
+                 call.slack, read);
+    for (std::size_t c = 0; c < channels; ++c)
+      for (std::size_t i = 0; i < count; ++i) call.depths[c * call.receivers.size() + members[i]] = read[c * count + i];
+  });
+  if (call.done) call.done(all);
 }
 
 std::vector<float> LightGridPass::opticalDepths(const Octree& tree, const Receivers& receivers,
@@ -178,57 +273,17 @@ std::vector<float> LightGridPass::opticalDepths(const Octree& tree, const Receiv
   const GridShape shape = gridShape(light, resolution, options.falloff);
   const GridPlan plan = planGrid(tree, receivers, shape, reached);
   const float slack = columnRules(tree, light, receivers.bounds()).slack;
-  const auto itemsOf = [&](const GridPlan::Tile& tile) {
-    return plan.receivers(tile).size() + plan.particles(tile).size();
-  };
-  // A batch's depths to the receivers they belong to.
-  const auto finish = [&](std::size_t first, std::size_t last) {
-    std::vector<const GridArrays*> parts;
-    for (std::size_t w = first; w < last; ++w) parts.push_back(&works_[w].arrays);
-    const std::vector<float> found = run(parts, channels, options.falloff, resolution.cell);
-    const std::size_t all = found.size() / channels;
-    std::vector<std::size_t> start(last - first + 1, 0);
-    for (std::size_t w = first; w < last; ++w)
-      start[w - first + 1] = start[w - first] + works_[w].arrays.receivers.size();
-    parallelBlocks(last - first, 1, [&](std::size_t k, std::size_t) {
-      static thread_local std::vector<float> read;
-      const Work& work = works_[first + k];
-      const std::span<const std::uint32_t> members = plan.receivers(*work.planned);
-      const std::size_t count = members.size();
-      read.resize(channels * count);
-      for (std::size_t c = 0; c < channels; ++c)
-        std::copy_n(found.begin() + static_cast<std::ptrdiff_t>(c * all + start[k]), count,
-                    read.begin() + static_cast<std::ptrdiff_t>(c * count));
-      addNearLight(tree, plan.nearLight, shape, work.planned->place, receivers, members, options, slack, read);
-      for (std::size_t c = 0; c < channels; ++c)
-        for (std::size_t i = 0; i < count; ++i) depths[c * receivers.size() + members[i]] = read[c * count + i];
-    });
-    if (done) done(all);
-  };
-  for (std::size_t begin = 0, end = 0; begin < plan.tiles.size(); begin = end) {
-    std::size_t items = 0;
-    while (end < plan.tiles.size() && (end == begin || items + itemsOf(plan.tiles[end]) <= kMostItems))
-      items += itemsOf(plan.tiles[end++]);
-    if (works_.size() < end - begin) works_.resize(end - begin);
-    parallelBlocks(end - begin, 1, [&](std::size_t k, std::size_t) {
-      const GridPlan::Tile& planned = plan.tiles[begin + k];
-      static thread_local GridTile tile;
-      static thread_local GridBlocks blocks;
-      tile.setUp(tree, receivers, plan, planned, shape, options.falloff);
-      works_[k].planned = &planned;
-      blocks.setUp(tile, receivers, plan.receivers(planned), plan.particles(planned), device_.leastSubgroupSize(),
-                   kMostSteps, works_[k].arrays);
-    });
-    for (std::size_t first = 0, last = 0; first < end - begin; first = last) {
-      const auto with = [&](const Sizes& sizes, std::size_t w) {
-        return sum(sizes, sizesOf(works_[w].arrays, channels));
-      };
-      Sizes sizes = with(kNoTiles, last++);
-      for (; last < end - begin && fits(with(sizes, last)); ++last) sizes = with(sizes, last);
-      finish(first, last);
+  Call call{tree, receivers, options, shape, plan, slack, done, std::move(depths)};
+  for (std::size_t begin = 0; begin < plan.tiles.size();) {
+    std::span<const Work> works = setUpTiles(call, begin);
+    begin += works.size();
+    while (!works.empty()) {
+      const std::span<const Work> batch = works.first(batchThatFits(works, channels));
+      keep(call, batch, run(batch, channels, options.falloff, resolution.cell));
+      works = works.subspan(batch.size());
     }
   }
-  return depths;
+  return std::move(call.depths);
 }
 
 }  // namespace mote

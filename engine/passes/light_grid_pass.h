@@ -38,8 +38,8 @@ class LightGridPass {
 
   /// Device seconds of all opticalDepths calls so far, from timestamps.
   double deviceSeconds() const { return deviceSeconds_; }
-  /// Gives back to the device's budget, and to the host, what the last opticalDepths needed; the next takes it again.
-  void release() { buffers_ = {}, works_ = {}; }
+  /// Gives back to the device's budget what the last opticalDepths needed; the next takes it again.
+  void release() { buffers_ = {}; }
 
  private:
   struct FillVariant {
@@ -58,9 +58,10 @@ class LightGridPass {
   using Sizes = std::array<std::uint64_t, 9>;
   /// A tile that is set up.
   struct Work {
-    const GridPlan::Tile* planned;
+    const GridPlan::Tile* planned = nullptr;
     GridArrays arrays;
   };
+  struct Call;
 
   const ComputePipeline& fill(const FillVariant& variant);
   /// The block of zeros.
@@ -69,9 +70,19 @@ class LightGridPass {
   static Sizes sum(const Sizes& a, const Sizes& b);
   bool fits(const Sizes& sizes);
   void makeRoom(const Sizes& sizes);
-  /// Optical depths of all receivers, [channel][receiver].
-  std::vector<float> run(std::span<const GridArrays* const> tiles, std::size_t channels, layout::uint falloff,
-                         double cell);
+  /// Sets up tiles of the plan from number `begin` on: as many as keep all threads busy.
+  std::span<const Work> setUpTiles(Call& call, std::size_t begin) const;
+  /// How many of them, one at least, go through the device together.
+  std::size_t batchThatFits(std::span<const Work> works, std::size_t channels);
+  /// Optical depths of all their receivers, [channel][receiver].
+  std::vector<float> run(std::span<const Work> works, std::size_t channels, layout::uint falloff, double cell);
+  /// The parts of `run`: arrays to the device, what all dispatches are told, and one channel's nodes.
+  std::vector<GridArrays::Pieces> upload(std::span<const Work> works, const Sizes& sizes, std::size_t channels);
+  layout::GridParams params(double cell) const;
+  void fillNodes(CommandBuffer& commands, std::span<const GridArrays::Pieces> all, layout::GridParams params,
+                 layout::uint falloff, bool colours);
+  /// Depths that `run` found to the receivers they belong to, with what particles near the light add.
+  static void keep(Call& call, std::span<const Work> works, std::span<const float> found);
 
   const Device& device_;
   TimestampQueries queries_;
@@ -79,7 +90,6 @@ class LightGridPass {
   std::map<FillVariant, ComputePipeline> fills_;
   ComputePipeline read_;
   Buffers buffers_;
-  std::vector<Work> works_;
   double deviceSeconds_ = 0;
 };
 
