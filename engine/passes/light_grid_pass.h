@@ -11,12 +11,9 @@
 // thousands of them at once; stores are side by side; there is no atomic, shared memory or barrier of a workgroup, so
 // sums are always in the same order. (So it should; it was measured on lavapipe alone.)
 #pragma once
-#include <array>
-#include <map>
 #include <vector>
 
-#include "engine/passes/grid_blocks.h"
-#include "engine/vulkan/device.h"
+#include "engine/passes/grid_device.h"
 #include "host/lighting/light_grid.h"
 
 namespace mote {
@@ -24,7 +21,7 @@ namespace mote {
 class LightGridPass {
  public:
   /// `device` must outlive the pass.
-  explicit LightGridPass(const Device& device);
+  explicit LightGridPass(const Device& device) : device_(device), grid_(device) {}
 
   /// As mote::gridOpticalDepths, T within 2e-5 of it; the same bits each time on devices with subgroups of one size,
   /// whatever their budget. Tiles go through the device in batches of about 64 MiB, or what the budget leaves of it,
@@ -37,25 +34,11 @@ class LightGridPass {
                                    std::span<const std::uint8_t> reached = {}, const RaysDone& done = {});
 
   /// Device seconds of all opticalDepths calls so far, from timestamps.
-  double deviceSeconds() const { return deviceSeconds_; }
+  double deviceSeconds() const { return grid_.seconds(); }
   /// Gives back to the device's budget what the last opticalDepths needed; the next takes it again.
-  void release() { buffers_ = {}; }
+  void release() { grid_.release(); }
 
  private:
-  struct FillVariant {
-    layout::uint falloff;
-    std::uint32_t kinds;
-    bool goesOn, colours;
-    auto operator<=>(const FillVariant&) const = default;
-  };
-  struct Buffers {
-    Buffer kernels, peaks, entries, blocks, strands, stored, table, receivers, depths;
-    std::array<Buffer*, 9> all() {
-      return {&kernels, &peaks, &entries, &blocks, &strands, &stored, &table, &receivers, &depths};
-    }
-  };
-  /// Bytes of each, in that order.
-  using Sizes = std::array<std::uint64_t, 9>;
   /// A tile that is set up.
   struct Work {
     const GridPlan::Tile* planned = nullptr;
@@ -63,34 +46,13 @@ class LightGridPass {
   };
   struct Call;
 
-  const ComputePipeline& fill(const FillVariant& variant);
-  /// The block of zeros.
-  static constexpr Sizes kNoTiles{0, 0, 0, 0, 0, layout::kBlockPairs * sizeof(layout::GridPair), 0, 0, 0};
-  static Sizes sizesOf(const GridArrays& arrays, std::size_t channels);
-  static Sizes sum(const Sizes& a, const Sizes& b);
-  bool fits(const Sizes& sizes);
-  void makeRoom(const Sizes& sizes);
   /// Sets up tiles of the plan from number `begin` on: as many as keep all threads busy.
   std::span<const Work> setUpTiles(Call& call, std::size_t begin) const;
-  /// How many of them, one at least, go through the device together.
-  std::size_t batchThatFits(std::span<const Work> works, std::size_t channels);
-  /// Optical depths of all their receivers, [channel][receiver].
-  std::vector<float> run(std::span<const Work> works, std::size_t channels, layout::uint falloff, double cell);
-  /// The parts of `run`: arrays to the device, what all dispatches are told, and one channel's nodes.
-  std::vector<GridArrays::Pieces> upload(std::span<const Work> works, const Sizes& sizes, std::size_t channels);
-  layout::GridParams params(double cell) const;
-  void fillNodes(CommandBuffer& commands, std::span<const GridArrays::Pieces> all, layout::GridParams params,
-                 layout::uint falloff, bool colours);
   /// Depths that `run` found to the receivers they belong to, with what particles near the light add.
   static void keep(Call& call, std::span<const Work> works, std::span<const float> found);
 
   const Device& device_;
-  TimestampQueries queries_;
-  std::uint32_t groupSize_, storeLanes_;
-  std::map<FillVariant, ComputePipeline> fills_;
-  ComputePipeline read_;
-  Buffers buffers_;
-  double deviceSeconds_ = 0;
+  GridDevice grid_;
 };
 
 }  // namespace mote
