@@ -202,10 +202,10 @@ void GridBlocks::setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint3
       to.table[g * kBlocks + b].here = entry;
       if (b > 0) to.table[g * kBlocks + b - 1].right = entry;
       while (first < end) {
-        const std::uint32_t here = std::min(end - first, (mostSteps - steps - 1) * lanes);
+        const std::uint32_t here = std::min({end - first, (mostSteps - steps - 1) * lanes, kMostBlockEntries});
         to.blocks.push_back({first, first + here, to.storedBlocks, binOf[g]});
         first += here, steps += 1 + (here + lanes - 1) / lanes;
-        if (steps + 2 > mostSteps && (first < end || g + 1 < groups_)) {
+        if (first < end || (steps + 2 > mostSteps && g + 1 < groups_)) {
           finish();
           // A piece that goes on begins with the last one's block, for what is left of it, or for nothing.
           if (first == end) to.blocks.push_back({end, end, to.storedBlocks, binOf[g]}), steps = 2;

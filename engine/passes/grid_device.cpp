@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "engine/passes/grid_parts.h"
 #include "engine/passes/part_size.h"
 #include "spirv.h"
 
@@ -162,7 +163,7 @@ std::vector<float> GridDevice::run(std::span<const GridArrays* const> tiles, con
   device_.run([&](CommandBuffer& commands) {
     const std::uint32_t stage = queries_.begin(commands, "light grid");
     for (std::size_t channel = 0; channel < manner.channels; ++channel) {
-      commands.barrier(barrier::computeToCompute);  // the channel before took the same nodes
+      commands.barrier(barrier::computeToCompute);  // the channel, or part of a tile, before took the same nodes
       fillNodes(commands, pieces, of, manner);
       commands.barrier(barrier::computeToCompute);
       of.count = static_cast<layout::uint>(receivers);
@@ -179,10 +180,42 @@ std::size_t GridDevice::batchThatFits(std::span<const GridArrays* const> tiles, 
   Sizes sizes = kNoTiles;
   for (std::size_t count = 0; count < tiles.size(); ++count) {
     sizes = sum(sizes, sizesOf(tiles[count]->counts(), manner));
-    const bool tooLong = std::accumulate(sizes.begin(), sizes.end(), std::uint64_t{0}) > kBatchBytes;
-    if (count > 0 && (tooLong || !fits(sizes))) return count;
+    const bool tooLong = count > 0 && std::accumulate(sizes.begin(), sizes.end(), std::uint64_t{0}) > kBatchBytes;
+    if (tooLong || !fits(sizes)) return count;
   }
   return tiles.size();
+}
+
+std::vector<float> GridDevice::runInParts(const GridArrays& tile, const Manner& manner) {
+  constexpr std::uint64_t kShares = 1 << 12;  // so finely is chosen how much of the tile a part has
+  GridParts parts(tile);
+  const GridCounts all = tile.counts();
+  const auto most = [&](std::uint64_t share) {
+    GridCounts counts = parts.least();
+    for (auto count : {&GridCounts::kernels, &GridCounts::entries, &GridCounts::blocks, &GridCounts::strands,
+                       &GridCounts::table, &GridCounts::receivers, &GridCounts::stored})
+      counts.*count += all.*count * share / kShares;
+    return counts;
+  };
+  Manner one = manner;
+  one.channels = 1;
+  const auto sizes = [&](std::uint64_t share) { return sum(kNoTiles, sizesOf(most(share), one)); };
+  const auto arrays = [&](std::uint64_t share) {
+    const Sizes of = sizes(share);
+    return std::vector<std::uint64_t>(of.begin(), of.end());
+  };
+  buffers_ = {};
+  const std::uint64_t share = partThatFits(device_, kShares, 0, arrays, device_.stagingCost(),
+                                           "particles and receivers of a tile of the light grid");
+  makeRoom(sizes(share));  // for all parts: what is stored must stay
+  std::vector<float> depths(manner.channels * all.receivers);
+  GridArrays part;
+  for (std::size_t channel = 0; channel < manner.channels; ++channel)
+    for (parts.start(most(share), channel); parts.next(part);) {
+      const std::vector<float> found = run(std::array<const GridArrays*, 1>{&part}, one);
+      for (std::size_t k = 0; k < found.size(); ++k) depths[channel * all.receivers + parts.receivers()[k]] = found[k];
+    }
+  return depths;
 }
 
 }  // namespace mote

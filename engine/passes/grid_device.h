@@ -24,10 +24,12 @@ class GridDevice {
   explicit GridDevice(const Device& device);
 
   /// How many of the tiles, from the first on, go through the device together: those that fill 64 MiB, or what the
-  /// budget leaves of it; one at least.
+  /// budget leaves of it. 0: not even the first fits.
   std::size_t batchThatFits(std::span<const GridArrays* const> tiles, const Manner& manner);
   /// Optical depths of all their receivers, [channel][receiver]. Throws MachineError where they do not fit.
   std::vector<float> run(std::span<const GridArrays* const> tiles, const Manner& manner);
+  /// The same bits of one tile, in parts (grid_parts.h). Throws MachineError where not even the least would fit.
+  std::vector<float> runInParts(const GridArrays& tile, const Manner& manner);
 
   /// Device seconds so far, from timestamps.
   double seconds() const { return seconds_; }

@@ -102,8 +102,9 @@ std::vector<float> LightGridPass::opticalDepths(const Octree& tree, const Receiv
     for (const Work& work : works) arrays.push_back(&work.arrays);
     std::span<const GridArrays* const> tiles = arrays;
     while (!works.empty()) {
-      const std::size_t count = grid_.batchThatFits(tiles, manner);
-      keep(call, works.first(count), grid_.run(tiles.first(count), manner));
+      const std::size_t batch = grid_.batchThatFits(tiles, manner), count = std::max<std::size_t>(batch, 1);
+      keep(call, works.first(count),
+           batch > 0 ? grid_.run(tiles.first(batch), manner) : grid_.runInParts(*tiles.front(), manner));
       works = works.subspan(count), tiles = tiles.subspan(count);
     }
   }
