@@ -33,15 +33,6 @@ struct Nodes {
 /// Group by number among those that the tile has; < 0: left out.
 int numberOf(const GridTile& tile, int group) { return tile.placeOfGroup(group) / kGroupBins - 1; }
 
-GridArrays::Pieces& piecesOf(std::vector<GridArrays::Pieces>& all, std::uint32_t round, std::uint32_t kinds) {
-  const auto before = [](const GridArrays::Pieces& a, const std::pair<std::uint32_t, std::uint32_t>& b) {
-    return std::pair(a.round, a.kinds) < b;
-  };
-  const auto at = std::lower_bound(all.begin(), all.end(), std::pair(round, kinds), before);
-  if (at != all.end() && at->round == round && at->kinds == kinds) return *at;
-  return *all.insert(at, {round, kinds, {}});
-}
-
 void setReceivers(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
                   std::span<const std::uint32_t> slots, GridArrays& to) {
   const GridPoints& points = tile.receiverPoints();
@@ -51,7 +42,7 @@ void setReceivers(const GridTile& tile, const Receivers& receivers, std::span<co
   for (std::size_t k = 0; k < members.size(); ++k) {
     const std::int32_t bin = points.bin[k];
     to.receivers[k] = {points.x[k], points.y[k], points.depth[k] - static_cast<float>(bin),
-                       static_cast<layout::uint>(numberOf(tile, bin >> 2)) * (kBlocks * layout::kBlockBins) +
+                       static_cast<layout::uint>(numberOf(tile, bin >> 2)) * kGroupPlaces +
                            static_cast<layout::uint>(bin & (kGroupBins - 1))};
     std::size_t self = k;
     if (!tile.receiversAreParticles) {
@@ -79,10 +70,22 @@ void mix(std::vector<layout::GridStrand>& strands) {
 
 }  // namespace
 
-std::size_t GridArrays::strands() const {
-  std::size_t count = 0;
-  for (const Pieces& p : pieces) count += p.strands.size();
-  return count;
+GridArrays::Pieces& piecesOf(std::vector<GridArrays::Pieces>& all, const GridArrays::Pieces::Key& key) {
+  const auto before = [](const GridArrays::Pieces& a, const GridArrays::Pieces::Key& b) { return a.key < b; };
+  const auto at = std::lower_bound(all.begin(), all.end(), key, before);
+  if (at != all.end() && at->key == key) return *at;
+  return *all.insert(at, {key, {}});
+}
+
+GridCounts GridArrays::counts() const {
+  GridCounts counts{.kernels = kernels.size(),
+                    .entries = entries.size(),
+                    .blocks = blocks.size(),
+                    .table = table.size(),
+                    .receivers = receivers.size(),
+                    .stored = storedBlocks};
+  for (const Pieces& p : pieces) counts.strands += p.strands.size();
+  return counts;
 }
 
 void GridBlocks::setUp(GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
@@ -187,7 +190,8 @@ void GridBlocks::setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint3
     std::uint32_t round = 0, steps = 0, last = 0;
     const auto finish = [&] {
       strand.end = static_cast<layout::uint>(to.blocks.size());
-      if (strand.end > strand.first) piecesOf(to.pieces, round++, kinds_[b]).strands.push_back(strand);
+      if (strand.end > strand.first)
+        piecesOf(to.pieces, {round, kinds_[b], round > 0}).strands.push_back(strand), ++round;
       strand.first = strand.end, steps = 0;
     };
     for (std::size_t g = 0; g < groups_; ++g) {
@@ -198,10 +202,10 @@ void GridBlocks::setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint3
       to.table[g * kBlocks + b].here = entry;
       if (b > 0) to.table[g * kBlocks + b - 1].right = entry;
       while (first < end) {
-        const std::uint32_t here = std::min(end - first, (mostSteps - steps - 1) * lanes);
+        const std::uint32_t here = std::min({end - first, (mostSteps - steps - 1) * lanes, kMostBlockEntries});
         to.blocks.push_back({first, first + here, to.storedBlocks, binOf[g]});
         first += here, steps += 1 + (here + lanes - 1) / lanes;
-        if (steps + 2 > mostSteps && (first < end || g + 1 < groups_)) {
+        if (first < end || (steps + 2 > mostSteps && g + 1 < groups_)) {
           finish();
           // A piece that goes on begins with the last one's block, for what is left of it, or for nothing.
           if (first == end) to.blocks.push_back({end, end, to.storedBlocks, binOf[g]}), steps = 2;
@@ -217,7 +221,7 @@ std::vector<GridArrays::Pieces> joinPieces(std::span<const GridArrays* const> ti
   std::uint32_t blocks = 0;
   for (const GridArrays* tile : tiles) {
     for (const GridArrays::Pieces& pieces : tile->pieces) {
-      std::vector<layout::GridStrand>& to = piecesOf(all, pieces.round, pieces.kinds).strands;
+      std::vector<layout::GridStrand>& to = piecesOf(all, pieces.key).strands;
       for (layout::GridStrand strand : pieces.strands) {
         strand.first += blocks, strand.end += blocks;
         to.push_back(strand);

@@ -12,12 +12,34 @@ namespace mote {
 /// What kernels of a strand are; a strand with several kinds has all their bits.
 enum GridKernelKinds : std::uint32_t { kTentKernels = 1, kEllipseKernels = 2, kCurvedKernels = 4 };
 
+/// Particles of a block that are summed at once: where there are more, their sums are added up part by part, however
+/// much a device may hold, so that a small budget can have the same bits. So many are far more than usual, and 1 MiB.
+constexpr std::uint32_t kMostBlockEntries = 1 << 15;
+/// Of a GridReceiver: of one group.
+constexpr std::uint32_t kGroupPlaces = layout::kTileBlocks * layout::kTileBlocks * layout::kBlockBins;
+
+/// How many of each a tile has, or a part of one.
+struct GridCounts {
+  std::uint64_t kernels = 0, entries = 0, blocks = 0, strands = 0, table = 0, receivers = 0;
+  std::uint64_t stored = 0;  ///< blocks, without the one of zeros
+
+  bool within(const GridCounts& most) const {
+    return kernels <= most.kernels && entries <= most.entries && blocks <= most.blocks && strands <= most.strands &&
+           table <= most.table && receivers <= most.receivers && stored <= most.stored;
+  }
+};
+
 /// Everything that dispatches read, of one tile.
 struct GridArrays {
   /// Pieces of strands, which go through the device together.
   struct Pieces {
-    std::uint32_t round = 0;  ///< after those of earlier rounds
-    std::uint32_t kinds = 0;
+    struct Key {
+      std::uint32_t round = 0;  ///< after those of earlier rounds
+      std::uint32_t kinds = 0;
+      bool goesOn = false;  ///< the first block of each has sums already
+      auto operator<=>(const Key&) const = default;
+    };
+    Key key;
     std::vector<layout::GridStrand> strands;
   };
 
@@ -25,18 +47,20 @@ struct GridArrays {
   std::vector<float> peaks[3];  ///< of the kernels, where there are three channels
   std::vector<std::uint32_t> entries;
   std::vector<layout::GridBlock> blocks;
-  std::vector<Pieces> pieces;  ///< by round, then by kinds
+  std::vector<Pieces> pieces;  ///< in the order of their keys
   std::vector<layout::GridEntryPair> table;
   std::vector<layout::GridReceiver> receivers;
   std::vector<float> own[3];       ///< of the receivers: what each finds of its own particle
   std::uint32_t storedBlocks = 0;  ///< without the one of zeros
 
-  std::size_t strands() const;
+  GridCounts counts() const;
 };
+/// Those with this key, put into their place if there were none.
+GridArrays::Pieces& piecesOf(std::vector<GridArrays::Pieces>& all, const GridArrays::Pieces::Key& key);
 
 /// Makes the arrays of a tile; holds on to its memory from tile to tile. A piece of a strand has as many steps as a
-/// shader may take, `mostSteps`: one a block, and one for each `lanes` of its particles. Linear in particles and in the
-/// blocks that they touch.
+/// shader may take, `mostSteps`: one a block, and one for each `lanes` of its particles; and of a block at most
+/// kMostBlockEntries. Linear in particles and in the blocks that they touch.
 class GridBlocks {
  public:
   /// `tile` is set up, and is weighed here; `members` are its receivers, `slots` its particles.

@@ -11,12 +11,9 @@
 // thousands of them at once; stores are side by side; there is no atomic, shared memory or barrier of a workgroup, so
 // sums are always in the same order. (So it should; it was measured on lavapipe alone.)
 #pragma once
-#include <array>
-#include <map>
 #include <vector>
 
-#include "engine/passes/grid_blocks.h"
-#include "engine/vulkan/device.h"
+#include "engine/passes/grid_device.h"
 #include "host/lighting/light_grid.h"
 
 namespace mote {
@@ -24,63 +21,40 @@ namespace mote {
 class LightGridPass {
  public:
   /// `device` must outlive the pass.
-  explicit LightGridPass(const Device& device);
+  explicit LightGridPass(const Device& device) : device_(device), grid_(device) {}
 
   /// As mote::gridOpticalDepths, T within 2e-5 of it; the same bits each time on devices with subgroups of one size,
-  /// whatever their budget. Tiles go through the device in batches of about 64 MiB, or what the budget leaves of it,
-  /// but one at least: throws MachineError where a single tile does not fit. Each takes there 32 bytes a particle (44
-  /// with three channels), 4 for each block that it touches, 20 a receiver (28), and 512 a block that is touched.
-  /// The host holds about the same, but for the last, of a million particles and receivers at a time, or of one tile.
-  /// Two to three times the CPU time of gridOpticalDepths on lavapipe.
+  /// whatever their budget. Tiles go through the device in batches of about 64 MiB, or what the budget leaves of it.
+  /// Each takes there 32 bytes a particle (44 with three channels), 4 for each block that it touches, 20 a receiver
+  /// (28), and 512 a block that is touched. A tile that does not fit goes in parts (grid_parts.h), one channel after
+  /// the other; throws MachineError where not even the least fits, which is 1.3 MiB where kMostBlockEntries particles
+  /// meet in a block and less where fewer do. The host holds about the same as the device, without what is stored, of a
+  /// million particles and receivers at a time, or of one tile. Two to three times the CPU time of gridOpticalDepths on
+  /// lavapipe.
   std::vector<float> opticalDepths(const Octree& tree, const Receivers& receivers, const layout::Light& light,
                                    const LightingOptions& options, const GridResolution& resolution,
                                    std::span<const std::uint8_t> reached = {}, const RaysDone& done = {});
 
   /// Device seconds of all opticalDepths calls so far, from timestamps.
-  double deviceSeconds() const { return deviceSeconds_; }
-  /// Gives back to the device's budget, and to the host, what the last opticalDepths needed; the next takes it again.
-  void release() { buffers_ = {}, works_ = {}; }
+  double deviceSeconds() const { return grid_.seconds(); }
+  /// Gives back to the device's budget what the last opticalDepths needed; the next takes it again.
+  void release() { grid_.release(); }
 
  private:
-  struct FillVariant {
-    layout::uint falloff;
-    std::uint32_t kinds;
-    bool goesOn, colours;
-    auto operator<=>(const FillVariant&) const = default;
-  };
-  struct Buffers {
-    Buffer kernels, peaks, entries, blocks, strands, stored, table, receivers, depths;
-    std::array<Buffer*, 9> all() {
-      return {&kernels, &peaks, &entries, &blocks, &strands, &stored, &table, &receivers, &depths};
-    }
-  };
-  /// Bytes of each, in that order.
-  using Sizes = std::array<std::uint64_t, 9>;
   /// A tile that is set up.
   struct Work {
-    const GridPlan::Tile* planned;
+    const GridPlan::Tile* planned = nullptr;
     GridArrays arrays;
   };
+  struct Call;
 
-  const ComputePipeline& fill(const FillVariant& variant);
-  /// The block of zeros.
-  static constexpr Sizes kNoTiles{0, 0, 0, 0, 0, layout::kBlockPairs * sizeof(layout::GridPair), 0, 0, 0};
-  static Sizes sizesOf(const GridArrays& arrays, std::size_t channels);
-  static Sizes sum(const Sizes& a, const Sizes& b);
-  bool fits(const Sizes& sizes);
-  void makeRoom(const Sizes& sizes);
-  /// Optical depths of all receivers, [channel][receiver].
-  std::vector<float> run(std::span<const GridArrays* const> tiles, std::size_t channels, layout::uint falloff,
-                         double cell);
+  /// Sets up tiles of the plan from number `begin` on: as many as keep all threads busy.
+  std::span<const Work> setUpTiles(Call& call, std::size_t begin) const;
+  /// Depths that `run` found to the receivers they belong to, with what particles near the light add.
+  static void keep(Call& call, std::span<const Work> works, std::span<const float> found);
 
   const Device& device_;
-  TimestampQueries queries_;
-  std::uint32_t groupSize_, storeLanes_;
-  std::map<FillVariant, ComputePipeline> fills_;
-  ComputePipeline read_;
-  Buffers buffers_;
-  std::vector<Work> works_;
-  double deviceSeconds_ = 0;
+  GridDevice grid_;
 };
 
 }  // namespace mote

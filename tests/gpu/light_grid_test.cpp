@@ -2,9 +2,11 @@
 #include <cmath>
 
 #include "engine/passes/light_grid_pass.h"
+#include "host/core/error.h"
 #include "host/core/random.h"
 #include "host/lighting/medium.h"
 #include "tests/gpu/gpu_fixture.h"
+#include "tests/gpu/small_device.h"
 #include "tests/support/lights.h"
 
 namespace mote {
@@ -132,9 +134,12 @@ TEST_F(LightGridPassTest, GoesOnWhereMoreParticlesMeetThanAShaderMayLoopOver) {
   // loops after 65,535.
   const Octree tree = ballTree(700000, 0.02, 0.02, 2, layout::kFalloffSmooth);
   const double found = worst(tree, directionalLight({0, 0, 1}), 0, {5, 5});
-  const double many = worst(tree, directionalLight({0, 0, 1}), 0, {5, 0.3});
-  std::printf("worst |dT| of 700,000 in a block: %.2e, in a few: %.2e\n", found, many);
+  const double few = worst(tree, directionalLight({0, 0, 1}), 0, {5, 0.3});
+  // Here no block has more than kMostBlockEntries, but all of a strand do.
+  const double many = worst(tree, directionalLight({0, 0, 1}), 0, {5, 0.005});
+  std::printf("worst |dT| of 700,000 in a block: %.2e, in a few: %.2e, in many: %.2e\n", found, few, many);
   EXPECT_LE(found, kRounding);
+  EXPECT_LE(few, kRounding);
   EXPECT_LE(many, kRounding);
 }
 
@@ -146,6 +151,58 @@ TEST_F(LightGridPassTest, GivesTheSameBitsEveryTime) {
   EXPECT_GT(pass.deviceSeconds(), 0);
   pass.release();
   for (int again = 0; again < 3; ++again) EXPECT_EQ(once(), first);
+}
+
+TEST_F(LightGridPassTest, SplitsTilesThatDoNotFitToTheSameBits) {
+  // Few cells: each face of the cube is a tile, with all kinds of kernels about the light, or the ball is but one. In
+  // the third grid more particles than kMostBlockEntries meet in a block, in the fourth more than a shader may loop
+  // over stand behind one another.
+  struct Case {
+    layout::Light light;
+    GridResolution resolution;
+    std::size_t count;
+    bool colours;
+    std::uint64_t bytes;  // far less than a tile takes
+  };
+  const vec3 inside(0.2f, 0.1f, -0.3f);
+  for (const Case& c : {Case{pointLight(inside), {0.06, 0.05}, 30000, false, 768u << 10},
+                        Case{pointLight(inside), {0.06, 0.05}, 30000, true, 512u << 10},
+                        Case{directionalLight({0, 0, 1}), {5, 0.3}, 100000, false, 2500u << 10},
+                        Case{directionalLight({0, 0, 1}), {5, 0.004}, 200000, false, 2500u << 10},
+                        Case{directionalLight({0.3f, -1, 0.2f}), {0.06, 0.002}, 30000, false, 512u << 10}}) {
+    const Octree tree = ballTree(c.count, 0.02, 0.08, 2, layout::kFalloffSmooth, c.colours, inside);
+    std::vector<float> x, y, z;
+    std::vector<std::uint32_t> self;
+    for (std::size_t slot = 0; slot < tree.particleCount(); slot += 3) {
+      Random random(44, slot);
+      const vec3 point = slot % 2 == 0 ? tree.position(slot) : vec3(random.direction() * random.uniform(0, 4));
+      x.push_back(point.x), y.push_back(point.y), z.push_back(point.z);
+      self.push_back(slot % 2 == 0 ? static_cast<std::uint32_t>(slot) : kNoSlot);
+    }
+    for (const Receivers& receivers : {slotsOf(tree), Receivers{x, y, z, self}}) {
+      const auto lit = [&](const Device& device) {
+        LightGridPass pass(device);
+        return pass.opticalDepths(tree, receivers, c.light, {}, c.resolution);
+      };
+      const std::vector<float> whole = lit(device());
+      for (const bool stageAlways : {false, true}) {
+        const SmallDevice small(c.bytes, stageAlways);
+        EXPECT_EQ(lit(small.device()), whole);
+      }
+    }
+  }
+}
+
+TEST_F(LightGridPassTest, RefusesWhereNotEvenABlockFits) {
+  const Octree tree = ballTree(20000, 0.05, 0.05, 2, layout::kFalloffSmooth);
+  const Gpu least(DeviceOptions{.validate = true, .memory = {.bytes = 48u << 10}});
+  LightGridPass pass(least.device());
+  try {
+    pass.opticalDepths(tree, slotsOf(tree), directionalLight({0, 0, 1}), {}, {0.1, 0.1});
+    FAIL() << "nothing was refused";
+  } catch (const MachineError& error) {
+    EXPECT_NE(std::string(error.what()).find("49152"), std::string::npos) << error.what();
+  }
 }
 
 TEST_F(LightGridPassTest, GivesZerosWithoutShadowsAndNothingForNoParticles) {

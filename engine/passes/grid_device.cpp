@@ -1,0 +1,221 @@
+#include "engine/passes/grid_device.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "engine/passes/grid_parts.h"
+#include "engine/passes/part_size.h"
+#include "spirv.h"
+
+namespace mote {
+namespace {
+
+/// Of all arrays of a batch of several tiles.
+constexpr std::uint64_t kBatchBytes = std::uint64_t{64} << 20;
+
+/// A buffer's elements to be filled: where it is mapped they are the buffer's own, else they are copied at the end.
+template <class T>
+class Filling {
+ public:
+  Filling(const Device& device, const Buffer& to, std::uint64_t bytes) : device_(device), to_(to) {
+    if (!to.mapped()) own_.resize(bytes / sizeof(T));
+    elements = to.mapped() ? to.map<T>().first(bytes / sizeof(T)) : std::span<T>(own_);
+  }
+  Filling(const Filling&) = delete;
+  void finish() const {
+    if (!to_.mapped()) device_.upload<T>(to_, own_);
+  }
+  std::span<T> elements;
+
+ private:
+  const Device& device_;
+  const Buffer& to_;
+  std::vector<T> own_;
+};
+
+}  // namespace
+
+GridDevice::GridDevice(const Device& device)
+    : device_(device),
+      queries_(device.createTimestampQueries(1)),
+      groupSize_(device.isCpu() ? device.subgroupSize() : std::max(64u, device.mostSubgroupSize())),
+      storeLanes_(std::min(8u, device.leastSubgroupSize())) {}
+
+const ComputePipeline& GridDevice::fill(const FillVariant& variant) {
+  ComputePipeline& made = fills_[variant];
+  if (made.handle() != VK_NULL_HANDLE) return made;
+  const auto has = [&](std::uint32_t kind) { return std::uint32_t{(variant.kinds & kind) != 0}; };
+  made = device_.createComputePipeline(spirv::grid_fill_comp, sizeof(layout::GridParams),
+                                       std::array<SpecializationConstant, 8>{{{0, groupSize_},
+                                                                              {1, variant.falloff},
+                                                                              {2, has(kTentKernels)},
+                                                                              {3, has(kEllipseKernels)},
+                                                                              {4, has(kCurvedKernels)},
+                                                                              {5, variant.goesOn},
+                                                                              {6, storeLanes_},
+                                                                              {7, variant.colours}}});
+  return made;
+}
+
+GridDevice::Sizes GridDevice::sum(const Sizes& a, const Sizes& b) {
+  Sizes all{};
+  for (std::size_t k = 0; k < all.size(); ++k) all[k] = a[k] + b[k];
+  return all;
+}
+
+GridDevice::Sizes GridDevice::sizesOf(const GridCounts& counts, const Manner& manner) {
+  constexpr std::uint64_t kFloat = sizeof(float), kUint = sizeof(layout::uint);
+  return {counts.kernels * sizeof(layout::GridKernel),
+          manner.colours ? manner.channels * counts.kernels * kFloat : 0,
+          counts.entries * kUint,
+          counts.blocks * sizeof(layout::GridBlock),
+          counts.strands * sizeof(layout::GridStrand),
+          counts.stored * layout::kBlockPairs * sizeof(layout::GridPair),
+          counts.table * sizeof(layout::GridEntryPair),
+          counts.receivers * sizeof(layout::GridReceiver),
+          manner.channels * counts.receivers * kFloat};
+}
+
+bool GridDevice::fits(const Sizes& sizes) {
+  std::uint64_t own = 0;
+  for (const Buffer* held : buffers_.all()) own += device_.bufferCost(held->size());
+  if (*std::max_element(sizes.begin(), sizes.end()) > device_.maxBufferBytes()) return false;
+  return arraysCost(device_, {sizes.begin(), sizes.end()}) + device_.stagingCost() <= device_.budget().room() + own;
+}
+
+void GridDevice::makeRoom(const Sizes& sizes) {
+  const auto buffers = buffers_.all();
+  bool enough = true;
+  Sizes room{};
+  for (std::size_t k = 0; k < sizes.size(); ++k) {
+    enough = enough && sizes[k] <= buffers[k]->size();
+    room[k] = std::max<std::uint64_t>(buffers[k]->size(), sizes[k] + sizes[k] / 8);
+  }
+  if (enough) return;
+  buffers_ = {};
+  // More where that fits: batches differ, and so few of them make the buffers anew.
+  if (!arraysFit(device_, {room.begin(), room.end()}, device_.stagingCost())) room = sizes;
+  for (std::size_t k = 0; k < sizes.size(); ++k) *buffers[k] = device_.createBuffer(room[k]);
+  device_.upload<layout::GridPair>(buffers_.stored, std::vector<layout::GridPair>(layout::kBlockPairs));
+}
+
+std::vector<GridArrays::Pieces> GridDevice::upload(std::span<const GridArrays* const> tiles, const Sizes& sizes,
+                                                   std::size_t channels) {
+  const Buffers& to = buffers_;
+  const Filling<layout::GridKernel> kernels(device_, to.kernels, sizes[0]);
+  const Filling<float> peaks(device_, to.peaks, sizes[1]);
+  const Filling<std::uint32_t> entries(device_, to.entries, sizes[2]);
+  const Filling<layout::GridBlock> blocks(device_, to.blocks, sizes[3]);
+  const Filling<layout::GridEntryPair> table(device_, to.table, sizes[6]);
+  const Filling<layout::GridReceiver> receivers(device_, to.receivers, sizes[7]);
+  const Filling<float> own(device_, to.depths, sizes[8]);
+  join(tiles, channels,
+       {kernels.elements, peaks.elements, entries.elements, blocks.elements, table.elements, receivers.elements,
+        own.elements});
+  kernels.finish(), peaks.finish(), entries.finish(), blocks.finish(), table.finish(), receivers.finish(), own.finish();
+  std::vector<GridArrays::Pieces> all = joinPieces(tiles);
+  std::size_t strands = 0;
+  for (const GridArrays::Pieces& pieces : all) {
+    device_.upload<layout::GridStrand>(to.strands, pieces.strands, strands);
+    strands += pieces.strands.size();
+  }
+  return all;
+}
+
+layout::GridParams GridDevice::params(double cell) const {
+  const Buffers& from = buffers_;
+  layout::GridParams params{};
+  params.kernels = from.kernels.address(), params.peaks = from.peaks.address();
+  params.entries = from.entries.address(), params.blocks = from.blocks.address();
+  params.stored = from.stored.address(), params.table = from.table.address();
+  params.receivers = from.receivers.address(), params.depths = from.depths.address();
+  params.cell = static_cast<float>(cell);
+  return params;
+}
+
+void GridDevice::fillNodes(CommandBuffer& commands, std::span<const GridArrays::Pieces> all, layout::GridParams params,
+                           const Manner& manner) {
+  const std::size_t eachGroup = groupSize_ / device_.mostSubgroupSize();
+  params.strands = buffers_.strands.address();
+  std::uint32_t round = 0;
+  for (const GridArrays::Pieces& pieces : all) {
+    if (pieces.key.round != round) commands.barrier(barrier::computeToCompute);
+    round = pieces.key.round;
+    params.count = static_cast<layout::uint>(pieces.strands.size());
+    commands.dispatchRow(fill({manner.falloff, pieces.key.kinds, pieces.key.goesOn, manner.colours}), params,
+                         (pieces.strands.size() + eachGroup - 1) / eachGroup);
+    params.strands += pieces.strands.size() * sizeof(layout::GridStrand);
+  }
+}
+
+std::vector<float> GridDevice::run(std::span<const GridArrays* const> tiles, const Manner& manner) {
+  Sizes sizes = kNoTiles;
+  for (const GridArrays* tile : tiles) sizes = sum(sizes, sizesOf(tile->counts(), manner));
+  makeRoom(sizes);
+  const std::vector<GridArrays::Pieces> pieces = upload(tiles, sizes, manner.channels);
+  if (read_.handle() == VK_NULL_HANDLE)
+    read_ = device_.createComputePipeline(spirv::grid_read_comp, sizeof(layout::GridParams),
+                                          std::array<SpecializationConstant, 1>{{{0, groupSize_}}});
+  const std::size_t kernels = sizes[0] / sizeof(layout::GridKernel);
+  const std::size_t receivers = sizes[7] / sizeof(layout::GridReceiver);
+  layout::GridParams of = params(manner.cell);
+  queries_.reset();
+  device_.run([&](CommandBuffer& commands) {
+    const std::uint32_t stage = queries_.begin(commands, "light grid");
+    for (std::size_t channel = 0; channel < manner.channels; ++channel) {
+      commands.barrier(barrier::computeToCompute);  // the channel, or part of a tile, before took the same nodes
+      fillNodes(commands, pieces, of, manner);
+      commands.barrier(barrier::computeToCompute);
+      of.count = static_cast<layout::uint>(receivers);
+      commands.dispatchRow(read_, of, (receivers + groupSize_ - 1) / groupSize_);
+      of.peaks += kernels * sizeof(float), of.depths += receivers * sizeof(float);
+    }
+    queries_.end(commands, stage);
+  });
+  for (const StageTime& stage : queries_.results()) seconds_ += stage.seconds;
+  return device_.download<float>(buffers_.depths, manner.channels * receivers);
+}
+
+std::size_t GridDevice::batchThatFits(std::span<const GridArrays* const> tiles, const Manner& manner) {
+  Sizes sizes = kNoTiles;
+  for (std::size_t count = 0; count < tiles.size(); ++count) {
+    sizes = sum(sizes, sizesOf(tiles[count]->counts(), manner));
+    const bool tooLong = count > 0 && std::accumulate(sizes.begin(), sizes.end(), std::uint64_t{0}) > kBatchBytes;
+    if (tooLong || !fits(sizes)) return count;
+  }
+  return tiles.size();
+}
+
+std::vector<float> GridDevice::runInParts(const GridArrays& tile, const Manner& manner) {
+  constexpr std::uint64_t kShares = 1 << 12;  // so finely is chosen how much of the tile a part has
+  GridParts parts(tile);
+  const GridCounts all = tile.counts();
+  const auto most = [&](std::uint64_t share) {
+    GridCounts counts = parts.least();
+    for (auto count : {&GridCounts::kernels, &GridCounts::entries, &GridCounts::blocks, &GridCounts::strands,
+                       &GridCounts::table, &GridCounts::receivers, &GridCounts::stored})
+      counts.*count += all.*count * share / kShares;
+    return counts;
+  };
+  Manner one = manner;
+  one.channels = 1;
+  const auto sizes = [&](std::uint64_t share) { return sum(kNoTiles, sizesOf(most(share), one)); };
+  const auto arrays = [&](std::uint64_t share) {
+    const Sizes of = sizes(share);
+    return std::vector<std::uint64_t>(of.begin(), of.end());
+  };
+  buffers_ = {};
+  const std::uint64_t share = partThatFits(device_, kShares, 0, arrays, device_.stagingCost(),
+                                           "particles and receivers of a tile of the light grid");
+  makeRoom(sizes(share));  // for all parts: what is stored must stay
+  std::vector<float> depths(manner.channels * all.receivers);
+  GridArrays part;
+  for (std::size_t channel = 0; channel < manner.channels; ++channel)
+    for (parts.start(most(share), channel); parts.next(part);) {
+      const std::vector<float> found = run(std::array<const GridArrays*, 1>{&part}, one);
+      for (std::size_t k = 0; k < found.size(); ++k) depths[channel * all.receivers + parts.receivers()[k]] = found[k];
+    }
+  return depths;
+}
+
+}  // namespace mote

@@ -1,0 +1,77 @@
+// Tiles of a light grid on the device: buffers, pipelines and dispatches (light_grid_pass.h says what for).
+#pragma once
+#include <array>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "engine/passes/grid_blocks.h"
+#include "engine/vulkan/device.h"
+
+namespace mote {
+
+class GridDevice {
+ public:
+  /// How a submission goes through its tiles.
+  struct Manner {
+    layout::uint falloff;
+    bool colours;  ///< peaks stand apart from the kernels
+    std::size_t channels;
+    double cell;
+  };
+
+  /// `device` must outlive this.
+  explicit GridDevice(const Device& device);
+
+  /// How many of the tiles, from the first on, go through the device together: those that fill 64 MiB, or what the
+  /// budget leaves of it. 0: not even the first fits.
+  std::size_t batchThatFits(std::span<const GridArrays* const> tiles, const Manner& manner);
+  /// Optical depths of all their receivers, [channel][receiver]. Throws MachineError where they do not fit.
+  std::vector<float> run(std::span<const GridArrays* const> tiles, const Manner& manner);
+  /// The same bits of one tile, in parts (grid_parts.h). Throws MachineError where not even the least would fit.
+  std::vector<float> runInParts(const GridArrays& tile, const Manner& manner);
+
+  /// Device seconds so far, from timestamps.
+  double seconds() const { return seconds_; }
+  /// Gives all buffers back to the budget.
+  void release() { buffers_ = {}; }
+
+ private:
+  struct FillVariant {
+    layout::uint falloff;
+    std::uint32_t kinds;
+    bool goesOn, colours;
+    auto operator<=>(const FillVariant&) const = default;
+  };
+  struct Buffers {
+    Buffer kernels, peaks, entries, blocks, strands, stored, table, receivers, depths;
+    std::array<Buffer*, 9> all() {
+      return {&kernels, &peaks, &entries, &blocks, &strands, &stored, &table, &receivers, &depths};
+    }
+  };
+  /// Bytes of each, in that order.
+  using Sizes = std::array<std::uint64_t, 9>;
+  const ComputePipeline& fill(const FillVariant& variant);
+  /// The block of zeros.
+  static constexpr Sizes kNoTiles{0, 0, 0, 0, 0, layout::kBlockPairs * sizeof(layout::GridPair), 0, 0, 0};
+  static Sizes sizesOf(const GridCounts& counts, const Manner& manner);
+  static Sizes sum(const Sizes& a, const Sizes& b);
+  bool fits(const Sizes& sizes);
+  void makeRoom(const Sizes& sizes);
+  /// The steps of `run`: arrays to the device, what all dispatches are told, and one channel's nodes.
+  std::vector<GridArrays::Pieces> upload(std::span<const GridArrays* const> tiles, const Sizes& sizes,
+                                         std::size_t channels);
+  layout::GridParams params(double cell) const;
+  void fillNodes(CommandBuffer& commands, std::span<const GridArrays::Pieces> all, layout::GridParams params,
+                 const Manner& manner);
+
+  const Device& device_;
+  TimestampQueries queries_;
+  std::uint32_t groupSize_, storeLanes_;
+  std::map<FillVariant, ComputePipeline> fills_;
+  ComputePipeline read_;
+  Buffers buffers_;
+  double seconds_ = 0;
+};
+
+}  // namespace mote
