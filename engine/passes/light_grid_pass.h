@@ -24,13 +24,13 @@ class LightGridPass {
   explicit LightGridPass(const Device& device) : device_(device), grid_(device) {}
 
   /// As mote::gridOpticalDepths, T within 2e-5 of it; the same bits each time on devices with subgroups of one size,
-  /// whatever their budget. Tiles go through the device in batches of about 64 MiB, or what the budget leaves of it.
-  /// Each takes there 32 bytes a particle (44 with three channels), 4 for each block that it touches, 20 a receiver
-  /// (28), and 512 a block that is touched. A tile that does not fit goes in parts (grid_parts.h), one channel after
-  /// the other; throws MachineError where not even the least fits, which is 1.3 MiB where kMostBlockEntries particles
-  /// meet in a block and less where fewer do. The host holds about the same as the device, without what is stored, of a
-  /// million particles and receivers at a time, or of one tile. Two to three times the CPU time of gridOpticalDepths on
-  /// lavapipe.
+  /// whatever their budget (tested on lavapipe; a driver may contract the pipelines of parts otherwise). Tiles go
+  /// through the device in batches of about 64 MiB, or what the budget leaves of it. Each takes there 32 bytes a
+  /// particle (44 with three channels), 4 for each block that it touches, 20 a receiver (28), and 512 a block that is
+  /// touched. A tile that does not fit goes in parts (grid_parts.h), one channel after the other; throws MachineError
+  /// where not even the least fits, which is 1.4 MiB where kMostBlockEntries particles meet in a block and less where
+  /// fewer do. The host holds about the same as the device, without what is stored, of a million particles and
+  /// receivers at a time, or of one tile. Two to three times the CPU time of gridOpticalDepths on lavapipe.
   std::vector<float> opticalDepths(const Octree& tree, const Receivers& receivers, const layout::Light& light,
                                    const LightingOptions& options, const GridResolution& resolution,
                                    std::span<const std::uint8_t> reached = {}, const RaysDone& done = {});

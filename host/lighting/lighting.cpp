@@ -15,6 +15,7 @@ namespace {
 struct Workspace {
   Column column;
   Beam beam;
+  ColumnBlocks blocks;
 };
 Workspace& workspace() {
   static thread_local Workspace ofThisThread;
@@ -140,9 +141,10 @@ std::vector<float> opticalDepthsOfFew(const Octree& tree, const Receivers& recei
       sumBeamRays(tree, kernel, rules, work, put);
       return;
     }
+    boundBlocks(column, work.beam, work.blocks);
     for (std::size_t k = 0; k < members.size(); ++k) {
       float sums[3];
-      sumAlone(column, work.beam, k, tree.channels(), rules, sums);
+      sumAlone(column, work.blocks, work.beam, k, tree.channels(), rules, sums);
       for (std::size_t channel = 0; channel < tree.channels(); ++channel)
         put(work.beam.rays.receiver[k], channel, sums[channel]);
     }
