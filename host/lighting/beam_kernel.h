@@ -24,10 +24,10 @@ struct PacketSums {
   alignas(64) float of[3][kPacketRays];
 };
 
-/// Rectangles in the column's frame, each around sixteen neighbours of column.gathered: who crosses elsewhere meets
-/// none.
+/// Rectangles in the column's frame, each around sixteen neighbours of column.gathered: who crosses elsewhere, or starts
+/// no deeper than `behind`, meets none.
 struct ColumnBlocks {
-  std::vector<float> lowU, highU, lowV, highV;
+  std::vector<float> lowU, highU, lowV, highV, behind;
 };
 void boundBlocks(const Column& column, const Beam& beam, ColumnBlocks& blocks);
 

@@ -428,7 +428,8 @@ void boundAll(const Column& column, const Beam& beam, ColumnBlocks& blocks) {
   const PlacedParticles& p = column.placed;
   const std::size_t count = column.gathered.count, number = (count + kPacketRays - 1) / kPacketRays;
   const Vec infinite = hn::Set(kTag, std::numeric_limits<float>::infinity()), scale = hn::Set(kTag, beam.extentScale);
-  for (auto* array : {&blocks.lowU, &blocks.highU, &blocks.lowV, &blocks.highV}) array->resize(number + kPacketRays);
+  for (auto* array : {&blocks.lowU, &blocks.highU, &blocks.lowV, &blocks.highV, &blocks.behind})
+    array->resize(number + kPacketRays);
   const auto bound = [&](const std::vector<float>& places, float slack, std::vector<float>& lows,
                          std::vector<float>& highs) {
     for (std::size_t block = 0; block < number; ++block) {
@@ -443,19 +444,26 @@ void boundAll(const Column& column, const Beam& beam, ColumnBlocks& blocks) {
       highs[block] = hn::GetLane(hn::MaxOfLanes(kTag, high)) + slack;
     }
   };
+  for (std::size_t block = 0; block < number; ++block) {
+    Vec nearest = infinite;
+    for (std::size_t i = block * kPacketRays; i < std::min(count, (block + 1) * kPacketRays); i += kLanes)
+      nearest = hn::Min(nearest, hn::IfThenElse(hn::FirstN(kTag, count - i), hn::LoadU(kTag, &p.behind[i]), infinite));
+    blocks.behind[block] = hn::GetLane(hn::MinOfLanes(kTag, nearest)) - column.margin;
+  }
   constexpr float kSlack = 1e-6f;  // what rounding does to places
   bound(p.u, kSlack * std::max(std::abs(beam.lowU), std::abs(beam.highU)), blocks.lowU, blocks.highU);
   bound(p.v, kSlack * std::max(std::abs(beam.lowV), std::abs(beam.highV)), blocks.lowV, blocks.highV);
 }
 
-/// Calls one(block) for those that a ray at u, v crosses, ascending.
+/// Calls one(block) for those that a ray at u, v crosses before it starts, ascending.
 template <class One>
-HWY_INLINE void eachCrossed(const ColumnBlocks& blocks, std::size_t number, Vec u, Vec v, const One& one) {
+HWY_INLINE void eachCrossed(const ColumnBlocks& blocks, std::size_t number, Vec u, Vec v, Vec start, const One& one) {
   for (std::size_t first = 0; first < number; first += kLanes) {
     const auto load = [first](const std::vector<float>& from) { return hn::LoadU(kTag, from.data() + first); };
     const auto inU = hn::And(hn::Le(load(blocks.lowU), u), hn::Ge(load(blocks.highU), u));
     const auto inV = hn::And(hn::Le(load(blocks.lowV), v), hn::Ge(load(blocks.highV), v));
-    const auto crossed = hn::And(hn::And(inU, inV), hn::FirstN(kTag, number - first));
+    const auto ahead = hn::And(hn::Lt(load(blocks.behind), start), hn::FirstN(kTag, number - first));
+    const auto crossed = hn::And(hn::And(inU, inV), ahead);
     if (hn::AllFalse(kTag, crossed)) continue;
     std::uint8_t bytes[8] = {};
     hn::StoreMaskBits(kTag, crossed, bytes);
@@ -477,7 +485,7 @@ HWY_NOINLINE void sumRay(const Column& column, const ColumnBlocks& blocks, const
             depth = set(rays.depth[ray]), depthLow = set(rays.depthLow[ray]), one = set(1), quarter = set(0.25f);
   const auto self = hn::Set(slotTag, rays.self[ray]);
   alignas(64) float lanes[kChannels][kPacketRays] = {};
-  eachCrossed(blocks, (found.count + kPacketRays - 1) / kPacketRays, u, v, [&](std::size_t block) {
+  eachCrossed(blocks, (found.count + kPacketRays - 1) / kPacketRays, u, v, depth, [&](std::size_t block) {
     for (std::size_t lane = 0; lane < kPacketRays; lane += kLanes) {
       const std::size_t i = block * kPacketRays + lane;
       const auto load = [i](const std::vector<float>& from) { return hn::LoadU(kTag, from.data() + i); };
