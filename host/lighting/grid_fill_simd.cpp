@@ -99,8 +99,8 @@ HWY_INLINE void weigh(const GridParticles& p, std::size_t first, Batch& batch) {
   }
 }
 
-/// Adds one particle of a batch that was weighed for this window.
-template <int kNodes>
+/// Adds one particle of a batch that was weighed for this window. `kOwn`: the tile's nodes are its own, in even steps.
+template <int kNodes, bool kOwn>
 HWY_INLINE void putDown(GridTile& tile, const Batch& batch, std::size_t first, std::size_t lane) {
   GridParticles& p = tile.particles;
   const std::size_t i = first + lane;
@@ -116,10 +116,11 @@ HWY_INLINE void putDown(GridTile& tile, const Batch& batch, std::size_t first, s
                 further = scaled(batch.share[1] + kGroupBins * lane, scale);
     float* values = tile.values[channel] + place;
     const std::int32_t* row = corner;
+    const std::ptrdiff_t step = tile.run, rowStep = step * tile.pitch;
     for (int r = 0; r < kNodes; ++r, row += tile.pitch)
       for (int c = 0; c < kNodes; ++c) {
         const float weight = batch.weight[r * kNodes + c][lane];
-        float* to = values + row[c];
+        float* to = values + (kOwn ? *corner + r * rowStep + c * step : row[c]);
         addTo(to, weight, share);
         if (both) addTo(to + kGroupBins, weight, further);
       }
@@ -127,16 +128,19 @@ HWY_INLINE void putDown(GridTile& tile, const Batch& batch, std::size_t first, s
 }
 
 /// Those of a batch that were weighed for this window.
-template <int kNodes>
+template <int kNodes, bool kOwn>
 HWY_NOINLINE void putDownBatch(GridTile& tile, const Batch& batch, std::size_t first, const int (&window)[kGridBatch]) {
   for (std::size_t lane = 0; lane < kGridBatch; ++lane)
-    if (window[lane] == kNodes) putDown<kNodes>(tile, batch, first, lane);
+    if (window[lane] == kNodes) putDown<kNodes, kOwn>(tile, batch, first, lane);
 }
 
 template <layout::uint kFalloff, int kNodes>
 HWY_INLINE void fillBatch(GridTile& tile, std::size_t first, const int (&window)[kGridBatch], Batch& batch) {
   weigh<kFalloff, kNodes>(tile.particles, first, batch);
-  putDownBatch<kNodes>(tile, batch, first, window);
+  if (tile.hasOwnNodes())
+    putDownBatch<kNodes, true>(tile, batch, first, window);
+  else
+    putDownBatch<kNodes, false>(tile, batch, first, window);
 }
 
 template <layout::uint kFalloff>

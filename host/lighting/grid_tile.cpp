@@ -136,7 +136,7 @@ void GridTile::setUp(const Octree& tree, const GridPatch& patch, const GridShape
   receivers = 0, receiversAreParticles = false;
   fetchParticles(tree, patch, *this);
   placeParticles(*this);
-  firstGroup = 0;
+  firstGroup = 0, run = 0;
   groupAt.resize(static_cast<std::size_t>(patch.bins / kGroupBins));
   for (std::size_t group = 0; group < groupAt.size(); ++group)
     groupAt[group] = static_cast<std::int32_t>(group) * kGroupBins;

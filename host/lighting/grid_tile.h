@@ -84,7 +84,7 @@ struct GridTile {
   /// run begins with a group of zeros, what lies before everything.
   int firstGroup = 0;
   std::vector<std::int32_t> groupAt;
-  int run = 0;                ///< bins of a node of its own
+  int run = 0;                ///< bins of a node, where nodes are its own; else 0
   int columns = 0, rows = 0;  ///< cells
   int margin = kNodeMargin;   ///< nodes beyond these on each side
   /// The runs of all nodes, of each channel: at first what lies in each bin, then the optical depth up to its end. A
@@ -105,6 +105,7 @@ struct GridTile {
   void placeStanding(const Octree& tree, const GridPatch& patch, const GridShape& all);
   /// Makes nodes of its own, all 0, with runs of one length side by side.
   void allotNodes();
+  bool hasOwnNodes() const { return run > 0; }
   /// What lies in each bin becomes the optical depth up to its end.
   void sum();
 
