@@ -156,5 +156,19 @@ TEST(GridPatches, AreNoneWhereAParticleIsInNoGrid) {
   EXPECT_FALSE(plan(none, {0, 0, 3}));
 }
 
+TEST(GridPatches, AreNoneWhereParticlesStandFarApart) {
+  std::vector<vec3> position;
+  for (int i = 0; i < 20 * 20 * 20; ++i) position.emplace_back(i % 20, i / 20 % 20, i / 400);
+  const std::vector<float> peak(position.size(), 1);
+  const auto plan = [&](float radius) {
+    return planPatches(buildOctree(position, std::vector<float>(position.size(), radius), peak),
+                       gridShape(directionalLight({0, 0, 1}), {radius, 2 * radius}, layout::kFalloffSmooth));
+  };
+  EXPECT_FALSE(plan(0.01f));  // a hundred cells from one to the next: each would be a patch
+  const auto close = plan(1);
+  ASSERT_TRUE(close);
+  EXPECT_LT(close->patches.size(), position.size() / 100);
+}
+
 }  // namespace
 }  // namespace mote

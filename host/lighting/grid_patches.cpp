@@ -12,6 +12,8 @@ namespace {
 
 /// Slots of a patch: so many that their arrays and nodes stay in a second-level cache.
 constexpr std::size_t kMostSlots = 2048;
+/// With fewer slots a patch, and more than so many patches, nothing is gained.
+constexpr std::size_t kLeastSlots = 16, kMostPatches = 4096;
 /// Runs at the edge of a face are split down to so many, as each of their particles is looked at by itself.
 constexpr std::size_t kMostAtEdge = 256;
 /// Bounds are widened by so much for what rounding does [cells, bins].
@@ -55,7 +57,7 @@ bool cover(const Extent& extent, const GridShape& shape, GridPatch& patch) {
   return true;
 }
 
-/// Half width of a kernel [cells] (placeParticles), and an upper bound where `distance` and `slope` are bounds.
+/// Half width of a kernel [cells] (placeParticles); an upper bound where `z` is a lower and `slope` an upper one.
 double halfWidth(double radius, double z, double slope, const GridShape& shape) {
   const double cells = radius / (shape.resolution.cell * z), tent = shape.moments.tentSquare();
   const double square = cells * cells - tent;
@@ -221,10 +223,12 @@ std::optional<PatchPlan> planPatches(const Octree& tree, const GridShape& shape)
   const std::vector<std::size_t> ends = runsOf(tree);
   const Planner planner(tree, shape, plan.mostNodes, plan.mostBins);
   std::vector<std::vector<GridPatch>> parts(ends.size() - 1);
+  const std::size_t most = kMostPatches + tree.particleCount() / kLeastSlots;
+  std::atomic<std::size_t> count = 0;
   std::atomic<bool> all = true;
   parallelBlocks(parts.size(), 4, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end && all; ++k)
-      if (!planner.add(ends[k], ends[k + 1], parts[k])) all = false;
+      if (!planner.add(ends[k], ends[k + 1], parts[k]) || (count += parts[k].size()) > most) all = false;
   });
   if (!all) return {};
   for (auto& part : parts) std::move(part.begin(), part.end(), std::back_inserter(plan.patches));

@@ -46,7 +46,8 @@ struct PatchPlan {
 };
 
 /// Follows from the arguments alone. None if some particle has no radius, or is so near to a point light that it is in
-/// no grid (GridPlan::nearLight).
+/// no grid (GridPlan::nearLight), or if particles stand so far apart that most had a patch of their own. Takes some 15
+/// bytes a particle at most.
 std::optional<PatchPlan> planPatches(const Octree& tree, const GridShape& shape);
 
 }  // namespace mote
