@@ -175,7 +175,9 @@ void addNearLight() {
   uint near = gl_SubgroupInvocationID;
   do {
     const uint at = kFoundCapacity - 1 - min(near, max(walk.nearCount, 1) - 1);
-    const vec4 p = params.found.at[foundList(beam.column, 0) + at], end = params.found.at[foundList(beam.column, 1) + at];
+    // Without any of them nothing was written there: a share of that might be infinite.
+    const vec4 p = near < walk.nearCount ? params.found.at[foundList(beam.column, 0) + at] : vec4(0);
+    const vec4 end = params.found.at[foundList(beam.column, 1) + at];
     vec3 peak = vec3(end.x, 0, 0);
     if (kChannels == 3) peak.yz = params.found.at[foundList(beam.column, 2) + at].zw;
     if (near >= walk.nearCount) peak = vec3(0);
