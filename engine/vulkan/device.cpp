@@ -92,8 +92,8 @@ VkImageCreateInfo imageInfo(std::uint32_t width, std::uint32_t height, VkFormat 
 
 }  // namespace
 
-Device::Device(VkPhysicalDevice physicalDevice, bool stageAlways, MemoryLimit limit)
-    : physicalDevice_(physicalDevice), stageAlways_(stageAlways) {
+Device::Device(VkPhysicalDevice physicalDevice, bool stageAlways, MemoryLimit limit, std::optional<std::uint8_t> fill)
+    : physicalDevice_(physicalDevice), stageAlways_(stageAlways), fill_(fill) {
   auto buffers =
       structure<VkPhysicalDeviceMaintenance4Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES);
   auto allocations =
@@ -252,6 +252,7 @@ Buffer Device::createBuffer(VkDeviceSize bytes, Memory memory) const {
   if (isMapped(type, memory))
     vkCheck(vkMapMemory(device_, buffer.memory_.get(), 0, VK_WHOLE_SIZE, 0, &buffer.data_), "vkMapMemory",
             fmt::format("{} bytes", bytes));
+  if (fill_ && buffer.data_) std::fill_n(static_cast<std::uint8_t*>(buffer.data_), bytes, *fill_);
   auto address = structure<VkBufferDeviceAddressInfo>(VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO);
   address.buffer = buffer.handle();
   buffer.address_ = vkGetBufferDeviceAddress(device_, &address);

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,8 +24,10 @@ class Device {
  public:
   /// A device from chooseDevice, which has checked that nothing is missing. `stageAlways` keeps Memory::Device buffers
   /// unmapped even where they could be mapped: it makes a CPU device behave as a discrete one does. `limit`, at most
-  /// the heap, is what buffers and pictures in device-local memory may take together.
-  explicit Device(VkPhysicalDevice physicalDevice, bool stageAlways = false, MemoryLimit limit = {});
+  /// the heap, is what buffers and pictures in device-local memory may take together. `fill`: what
+  /// every byte of a new buffer is set to, where it is mapped; for tests, as what nothing writes then shows.
+  explicit Device(VkPhysicalDevice physicalDevice, bool stageAlways = false, MemoryLimit limit = {},
+                  std::optional<std::uint8_t> fill = {});
   ~Device();
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
@@ -109,6 +112,7 @@ class Device {
 
   VkPhysicalDevice physicalDevice_;
   bool stageAlways_;
+  std::optional<std::uint8_t> fill_;
   std::string name_;
   bool cpu_ = false, float64_ = false;
   float mostPointSide_ = 1;

@@ -1,6 +1,7 @@
 // Instance and device in one: what the renderer, the tools and the tests open.
 #pragma once
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@ struct DeviceOptions {
   bool validate = false;     // validation and synchronization layers
   bool stageAlways = false;  // see Device
   MemoryLimit memory = {};
+  std::optional<std::uint8_t> fill = {};  // see Device
 };
 
 /// Move-only; whatever its device made must be destroyed before it.

@@ -72,6 +72,25 @@ TEST_F(LightPassTest, AgreesWithTheHostUnderEveryRule) {
   EXPECT_LE(worst, 2e-5);
 }
 
+TEST(LightPassMemory, WhatNothingWroteDoesNotCount) {
+  // Floats of the bits 0xfefefefe are −1.7e38: with the near-light list empty, a share of its entry would be infinite.
+  const Octree tree = ballTree(250, 0.2, 0.3, 4, layout::kFalloffSmooth, vec3(0));
+  const layout::Light light = pointLight({2, 3, 1});
+  const std::vector<float> onHost = opticalDepths(tree, light, {});
+  for (const std::uint8_t fill : {0x00, 0x7f, 0xfe, 0xff}) {
+    const Gpu gpu(DeviceOptions{.validate = true, .fill = fill});
+    {
+      LightPass pass(gpu.device(), layout::kFalloffSmooth, layout::kEndpointSoft);
+      pass.setTree(tree);
+      const std::vector<float> onDevice = pass.opticalDepths(light, {});
+      ASSERT_EQ(onDevice.size(), onHost.size());
+      for (std::size_t k = 0; k < onHost.size(); ++k)
+        ASSERT_NEAR(onDevice[k], onHost[k], 2e-5) << k << " fill " << +fill;
+    }
+    EXPECT_EQ(gpu.validationMessages(), std::vector<std::string>{});
+  }
+}
+
 TEST_F(LightPassTest, AgreesForRadiiOverThreeDecades) {
   double worst = 0;
   for (const layout::uint falloff : kFalloffs) {
