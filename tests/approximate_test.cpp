@@ -15,6 +15,7 @@
 #include "host/particles/particle_loader.h"
 #include "host/particles/spacing.h"
 #include "tests/support/lights.h"
+#include "tests/support/same_bits.h"
 
 namespace mote {
 namespace {
@@ -290,17 +291,7 @@ TEST(LightGrid, TheSameBitsOnEveryInstructionSetAndAnyNumberOfThreads) {
   const Octree tree = noiseCloud(30000, 1.5, 3).tree(4);
   const layout::Light light = pointLight({0.3f, 2, 1});
   const GridResolution resolution{0.3 * tree.meanRadius, 1.5 * tree.meanRadius};
-  const auto once = [&] { return gridOpticalDepths(tree, slotsOf(tree), light, {}, resolution); };
-  const std::vector<float> best = once();
-  for (const std::string& target : simdTargets()) {
-    useSimdTarget(target);
-    EXPECT_EQ(once(), best) << target;
-  }
-  useSimdTarget("");
-  for (const unsigned threads : {1u, 2u, 7u}) {
-    const ThreadLimit limit(threads);
-    EXPECT_EQ(once(), best) << threads;
-  }
+  expectSameBits([&] { return gridOpticalDepths(tree, slotsOf(tree), light, {}, resolution); });
 }
 
 TEST(Approximate, ProbesFewAndFarBetweenAreExact) {

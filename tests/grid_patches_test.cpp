@@ -13,6 +13,7 @@
 #include "host/particles/generate.h"
 #include "host/particles/spacing.h"
 #include "tests/support/lights.h"
+#include "tests/support/same_bits.h"
 
 namespace mote {
 namespace {
@@ -78,17 +79,7 @@ TEST(GridPatches, AreTheSameBitsOnEveryInstructionSetAndAnyNumberOfThreads) {
     const Octree tree = cloudTree(30000, 4);
     const GridResolution resolution = resolutionOf(tree, light, 0.7);
     ASSERT_TRUE(goesByPatches(tree, light, resolution));
-    const auto once = [&] { return gridOpticalDepths(tree, slotsOf(tree), light, {}, resolution); };
-    const std::vector<float> best = once();
-    for (const std::string& target : simdTargets()) {
-      useSimdTarget(target);
-      EXPECT_EQ(once(), best) << target;
-    }
-    useSimdTarget("");
-    for (const unsigned threads : {1u, 2u, 7u}) {
-      const ThreadLimit limit(threads);
-      EXPECT_EQ(once(), best) << threads;
-    }
+    expectSameBits([&] { return gridOpticalDepths(tree, slotsOf(tree), light, {}, resolution); });
   }
 }
 

@@ -15,6 +15,7 @@
 #include "host/particles/spacing.h"
 #include "tests/support/lighting_oracle.h"
 #include "tests/support/lights.h"
+#include "tests/support/same_bits.h"
 
 namespace mote {
 namespace {
@@ -336,17 +337,7 @@ TEST(LevelOfDetail, TheSameBitsOnEveryInstructionSetAndAnyNumberOfThreads) {
   Octree tree = noiseCloud(30000, 4, 4, 2);
   colour(tree);
   const layout::Light light = pointLight({0.3f, 2, 1});
-  const auto once = [&] { return lodOpticalDepths(detailOf(tree, {0.02, 1}), slotsOf(tree), light, {}); };
-  const std::vector<float> best = once();
-  for (const std::string& target : simdTargets()) {
-    useSimdTarget(target);
-    EXPECT_EQ(once(), best) << target;
-  }
-  useSimdTarget("");
-  for (const unsigned threads : {1u, 2u, 7u}) {
-    const ThreadLimit limit(threads);
-    EXPECT_EQ(once(), best) << threads;
-  }
+  expectSameBits([&] { return lodOpticalDepths(detailOf(tree, {0.02, 1}), slotsOf(tree), light, {}); });
 }
 
 TEST(LevelOfDetail, TheCostIsForeseen) {
