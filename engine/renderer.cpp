@@ -13,7 +13,7 @@
 #include "host/core/log.h"
 #include "host/core/parallel.h"
 #include "host/core/timer.h"
-#include "host/lighting/beam_kernel.h"
+#include "host/lighting/exact/beam_kernel.h"
 #include "host/solids/surfaces.h"
 #include "host/splat/splat.h"
 

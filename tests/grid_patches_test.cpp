@@ -1,5 +1,5 @@
 // A light grid by patches is the grid that goes tile by tile, and its patches have what they must.
-#include "host/lighting/grid_patches.h"
+#include "host/lighting/grid/patches.h"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,9 @@
 
 #include "host/core/parallel.h"
 #include "host/core/random.h"
-#include "host/lighting/beam_kernel.h"
-#include "host/lighting/grid_field.h"
-#include "host/lighting/light_grid.h"
+#include "host/lighting/exact/beam_kernel.h"
+#include "host/lighting/grid/field.h"
+#include "host/lighting/grid/light_grid.h"
 #include "host/particles/generate.h"
 #include "host/particles/spacing.h"
 #include "tests/support/lights.h"

@@ -9,7 +9,7 @@
 
 #include "host/core/parallel.h"
 #include "host/core/random.h"
-#include "host/lighting/beam_kernel.h"
+#include "host/lighting/exact/beam_kernel.h"
 #include "host/lighting/medium.h"
 #include "host/particles/generate.h"
 #include "host/particles/spacing.h"

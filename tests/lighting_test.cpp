@@ -8,8 +8,8 @@
 
 #include "host/core/parallel.h"
 #include "host/core/random.h"
-#include "host/lighting/beam_kernel.h"
-#include "host/lighting/beams.h"
+#include "host/lighting/exact/beam_kernel.h"
+#include "host/lighting/exact/beams.h"
 #include "host/lighting/medium.h"
 #include "tests/support/lighting_oracle.h"
 #include "tests/support/lights.h"

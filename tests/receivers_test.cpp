@@ -5,8 +5,8 @@
 
 #include "host/core/parallel.h"
 #include "host/core/random.h"
-#include "host/lighting/beam_kernel.h"
-#include "host/lighting/beams.h"
+#include "host/lighting/exact/beam_kernel.h"
+#include "host/lighting/exact/beams.h"
 #include "host/lighting/irradiance.h"
 #include "host/lighting/lighting.h"
 #include "host/lighting/medium.h"

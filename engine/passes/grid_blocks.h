@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "host/lighting/grid_tile.h"
+#include "host/lighting/grid/tile.h"
 #include "shaders/glsl/layout/grid.h"
 
 namespace mote {

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "host/core/parallel.h"
-#include "host/lighting/grid_near_light.h"
+#include "host/lighting/grid/near_light.h"
 
 namespace mote {
 namespace {

@@ -1,4 +1,4 @@
-// The light grid in compute shaders: mote::gridOpticalDepths (host/lighting/light_grid.h) on the device.
+// The light grid in compute shaders: mote::gridOpticalDepths (host/lighting/grid/light_grid.h) on the device.
 //
 // The host plans the tiles, places particles and receivers, in double, weighs the kernels in the same step, and sorts
 // each tile's particles by the blocks of 4 × 4 nodes and 4 bins that their kernels touch (grid_blocks.h). The device
@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "engine/passes/grid_device.h"
-#include "host/lighting/light_grid.h"
+#include "host/lighting/grid/light_grid.h"
 
 namespace mote {
 

@@ -9,7 +9,7 @@
 #include "engine/passes/part_size.h"
 #include "host/core/log.h"
 #include "host/core/parallel.h"
-#include "host/lighting/beam.h"
+#include "host/lighting/exact/beam.h"
 #include "spirv.h"
 
 namespace mote {

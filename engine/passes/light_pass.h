@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "engine/vulkan/device.h"
-#include "host/lighting/beams.h"
+#include "host/lighting/exact/beams.h"
 #include "host/lighting/lighting.h"
 #include "host/octree/octree.h"
 

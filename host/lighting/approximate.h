@@ -3,7 +3,7 @@
 #include <functional>
 
 #include "host/lighting/error_probes.h"
-#include "host/lighting/light_grid.h"
+#include "host/lighting/grid/light_grid.h"
 
 namespace mote {
 

@@ -6,7 +6,7 @@
 #include "host/core/cap.h"
 #include "host/core/error.h"
 #include "host/core/parallel.h"
-#include "host/lighting/grid_plan.h"
+#include "host/lighting/grid/plan.h"
 
 namespace mote {
 namespace {

@@ -4,8 +4,8 @@
 
 #include "host/core/error.h"
 #include "host/core/parallel.h"
-#include "host/lighting/beam_kernel.h"
-#include "host/lighting/beams.h"
+#include "host/lighting/exact/beam_kernel.h"
+#include "host/lighting/exact/beams.h"
 #include "host/lighting/irradiance.h"
 
 namespace mote {

@@ -1,5 +1,5 @@
 // The optical depths of a beam's rays from what light_gather.comp found for its column: the twin of choose and sum in
-// host/lighting (beam_kernel.h), for one subgroup a beam.
+// host/lighting/exact (beam_kernel.h), for one subgroup a beam.
 //
 // First the column's particles that may touch the beam are chosen, in the order of their reach: by boxes of four bytes,
 // so what most of them cost is a word. Then rays go in sets of kRays. A lane has a particle of its own and all rays of
@@ -29,7 +29,7 @@ layout(constant_id = 11) const bool kNearLight = false;  // there may be particl
 const uint kRays = kGroupRays * kGroups;
 const uint kMostGroups = 8;
 const uint kStride = 64;  // particles between two looks at whether all is dark
-const float kBehind = 2.07;  // 1 + kBehindRadii of host/lighting/column.h
+const float kBehind = 2.07;  // 1 + kBehindRadii of host/lighting/exact/column.h
 const float kGreatestInverseArea = 1e36;
 
 LightBeam beam;

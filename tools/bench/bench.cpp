@@ -10,7 +10,7 @@
 #include "host/core/log.h"
 #include "host/core/output_file.h"
 #include "host/core/parallel.h"
-#include "host/lighting/beam_kernel.h"
+#include "host/lighting/exact/beam_kernel.h"
 #include "tools/render.h"
 
 namespace mote {

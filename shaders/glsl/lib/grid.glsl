@@ -1,4 +1,4 @@
-// What the grid_*.comp share. C++ twins: host/lighting/grid_tile.h and grid_fill_simd.cpp, operation by operation.
+// What the grid_*.comp share. C++ twins: tile.h and fill_simd.cpp in host/lighting/grid, operation by operation.
 #ifndef MOTE_LIB_GRID_GLSL
 #define MOTE_LIB_GRID_GLSL
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require

@@ -1,4 +1,4 @@
-// What lies in a column's way: the twin of gather, place and sort in host/lighting (column.h says what the numbers are).
+// What lies in a column's way: the twin of gather, place and sort in host/lighting/exact (column.h says what the numbers are).
 //
 // A subgroup walks the tree for one column. All lanes go the same way: each tests a node against two of the planes, and
 // a vote decides; the particles of a leaf are tested one a lane, and those inside are appended side by side. When the
@@ -25,7 +25,7 @@
 
 const uint kMostSteps = 48000;  // of the walk's loops, a dispatch: with the sort's below 65535
 const uint kPlanes = 6;         // as ColumnPlanes
-// As in host/lighting/column.h.
+// As in host/lighting/exact/column.h.
 const float kNearLightRadii = 8.0;
 const float kLeastCosine = 0.45;
 const float kGreatestInverseArea = 1e36;

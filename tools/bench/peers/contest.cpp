@@ -8,7 +8,7 @@
 #include "host/core/error.h"
 #include "host/core/parallel.h"
 #include "host/core/timer.h"
-#include "host/lighting/beam_kernel.h"
+#include "host/lighting/exact/beam_kernel.h"
 
 namespace mote {
 namespace {

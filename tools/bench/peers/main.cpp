@@ -7,7 +7,7 @@
 #include "host/core/output_file.h"
 #include "host/core/parallel.h"
 #include "host/core/timer.h"
-#include "host/lighting/beam_kernel.h"
+#include "host/lighting/exact/beam_kernel.h"
 #include "tools/bench/peers/check.h"
 #include "tools/bench/peers/cloud.h"
 #include "tools/bench/peers/contest.h"

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/lighting/grid_tile.h"
+#include "host/lighting/grid/tile.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "host/lighting/grid_alone_simd.cpp"
+#define HWY_TARGET_INCLUDE "host/lighting/grid/alone_simd.cpp"
 // clang-format off
 #include <hwy/foreach_target.h>
-#include "host/lighting/grid_vectors-inl.h"
+#include "host/lighting/grid/vectors-inl.h"
 // clang-format on
 
 HWY_BEFORE_NAMESPACE();

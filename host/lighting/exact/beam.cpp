@@ -1,4 +1,4 @@
-#include "host/lighting/beam.h"
+#include "host/lighting/exact/beam.h"
 
 #include <algorithm>
 #include <cmath>

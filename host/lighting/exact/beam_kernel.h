@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "host/lighting/beam.h"
+#include "host/lighting/exact/beam.h"
 
 namespace mote {
 
@@ -24,8 +24,8 @@ struct PacketSums {
   alignas(64) float of[3][kPacketRays];
 };
 
-/// Rectangles in the column's frame, each around sixteen neighbours of column.gathered: who crosses elsewhere, or starts
-/// no deeper than `behind`, meets none.
+/// Rectangles in the column's frame, each around sixteen neighbours of column.gathered: who crosses elsewhere, or
+/// starts no deeper than `behind`, meets none.
 struct ColumnBlocks {
   std::vector<float> lowU, highU, lowV, highV, behind;
 };

@@ -1,11 +1,11 @@
-#include "host/lighting/grid_patches.h"
+#include "host/lighting/grid/patches.h"
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 
 #include "host/core/parallel.h"
-#include "host/lighting/grid_tile.h"
+#include "host/lighting/grid/tile.h"
 
 namespace mote {
 namespace {

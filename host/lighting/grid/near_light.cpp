@@ -1,11 +1,11 @@
-#include "host/lighting/grid_near_light.h"
+#include "host/lighting/grid/near_light.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "host/core/cap.h"
 #include "host/core/falloff.h"
-#include "host/lighting/beam_kernel.h"
+#include "host/lighting/exact/beam_kernel.h"
 
 namespace mote {
 namespace {

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <utility>
 
-#include "host/lighting/grid_tile.h"
+#include "host/lighting/grid/tile.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "host/lighting/grid_place_simd.cpp"
+#define HWY_TARGET_INCLUDE "host/lighting/grid/place_simd.cpp"
 // clang-format off
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>

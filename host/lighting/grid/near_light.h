@@ -1,6 +1,6 @@
 // What lies within a few radii of a point light, which no light grid has (light_grid.h): added exactly.
 #pragma once
-#include "host/lighting/grid_plan.h"
+#include "host/lighting/grid/plan.h"
 
 namespace mote {
 

@@ -10,7 +10,7 @@
 #endif
 
 #include "host/lighting/falloff-inl.h"
-#include "host/lighting/grid_tile.h"
+#include "host/lighting/grid/tile.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace mote::HWY_NAMESPACE {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "host/lighting/grid_plan.h"
+#include "host/lighting/grid/plan.h"
 
 namespace mote {
 
@@ -23,7 +23,7 @@ struct GridPatch {
   int margin = 0;                        ///< nodes beyond these that kernels reach, on each side
   double firstBin = 0;                   ///< a whole multiple of kGroupBins
   int bins = 0;                          ///< as well
-  /// All kernels, those too that do not go by batches (grid_tile.h): nodes on the face that they lie between, and bins,
+  /// All kernels, those too that do not go by batches (tile.h): nodes on the face that they lie between, and bins,
   /// whole multiples of kGroupBins.
   NodeRange nodes{};
   double nearestBin = 0, deepestBin = 0;

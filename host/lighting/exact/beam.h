@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "host/lighting/column.h"
+#include "host/lighting/exact/column.h"
 
 namespace mote {
 

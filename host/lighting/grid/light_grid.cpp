@@ -1,4 +1,4 @@
-#include "host/lighting/light_grid.h"
+#include "host/lighting/grid/light_grid.h"
 
 #include <tbb/enumerable_thread_specific.h>
 
@@ -8,9 +8,9 @@
 
 #include "host/core/error.h"
 #include "host/core/parallel.h"
-#include "host/lighting/grid_field.h"
-#include "host/lighting/grid_near_light.h"
-#include "host/lighting/grid_tile.h"
+#include "host/lighting/grid/field.h"
+#include "host/lighting/grid/near_light.h"
+#include "host/lighting/grid/tile.h"
 
 namespace mote {
 namespace {

@@ -1,4 +1,4 @@
-#include "host/lighting/grid_tile.h"
+#include "host/lighting/grid/tile.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "host/lighting/column.h"
+#include "host/lighting/exact/column.h"
 
 #include <algorithm>
 #include <cmath>

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "host/lighting/grid_patches.h"
+#include "host/lighting/grid/patches.h"
 
 namespace mote {
 

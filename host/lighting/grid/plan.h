@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "host/core/raw_vector.h"
-#include "host/lighting/column.h"
-#include "host/lighting/light_grid.h"
+#include "host/lighting/exact/column.h"
+#include "host/lighting/grid/light_grid.h"
 
 namespace mote {
 

@@ -1,14 +1,14 @@
 // What the receivers of a light grid read.
 #include <algorithm>
 
-#include "host/lighting/grid_field.h"
-#include "host/lighting/grid_tile.h"
+#include "host/lighting/grid/field.h"
+#include "host/lighting/grid/tile.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "host/lighting/grid_read_simd.cpp"
+#define HWY_TARGET_INCLUDE "host/lighting/grid/read_simd.cpp"
 // clang-format off
 #include <hwy/foreach_target.h>
-#include "host/lighting/grid_vectors-inl.h"
+#include "host/lighting/grid/vectors-inl.h"
 // clang-format on
 
 HWY_BEFORE_NAMESPACE();

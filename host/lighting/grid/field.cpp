@@ -1,4 +1,4 @@
-#include "host/lighting/grid_field.h"
+#include "host/lighting/grid/field.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,11 +5,11 @@
 #include <limits>
 
 #include "host/core/error.h"
-#include "host/lighting/beam_kernel.h"
-#include "host/lighting/rules.h"
+#include "host/lighting/exact/beam_kernel.h"
+#include "host/lighting/exact/rules.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "host/lighting/beam_simd.cpp"
+#define HWY_TARGET_INCLUDE "host/lighting/exact/beam_simd.cpp"
 // clang-format off
 #include <hwy/foreach_target.h>
 #include <hwy/cache_control.h>

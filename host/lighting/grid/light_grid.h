@@ -6,9 +6,9 @@
 // The interpolation widens kernels by a cell's variance, so they are put down narrower by as much.
 //
 // The cost is linear in particles, whatever they overlap. There are two ways, the same grid but for rounding:
-//   by patches (grid_patches.h, grid_field.h), where the particles light themselves and the grid has not many more nodes
+//   by patches (patches.h, field.h), where the particles light themselves and the grid has not many more nodes
 //     than particles: runs of slots go straight into one field of nodes, as they stand in memory;
-//   tile by tile (grid_plan.h, grid_tile.h): particles and receivers are sorted first, a tile's nodes pass through the
+//   tile by tile (plan.h, tile.h): particles and receivers are sorted first, a tile's nodes pass through the
 //     caches, and nothing is as large as the whole grid.
 //
 // The nodes stand at whole multiples of a cell about the light (point lights: on the faces of a cube along the world's

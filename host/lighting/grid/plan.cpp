@@ -1,4 +1,4 @@
-#include "host/lighting/grid_plan.h"
+#include "host/lighting/grid/plan.h"
 
 #include <algorithm>
 #include <cmath>

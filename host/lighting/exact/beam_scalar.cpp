@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/lighting/beam_kernel.h"
-#include "host/lighting/rules.h"
+#include "host/lighting/exact/beam_kernel.h"
+#include "host/lighting/exact/rules.h"
 
 namespace mote {
 namespace {

@@ -1,12 +1,12 @@
-// The nodes of a light grid that goes by patches (grid_patches.h).
+// The nodes of a light grid that goes by patches (patches.h).
 #pragma once
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "host/core/raw_vector.h"
-#include "host/lighting/grid_patches.h"
-#include "host/lighting/grid_tile.h"
+#include "host/lighting/grid/patches.h"
+#include "host/lighting/grid/tile.h"
 
 namespace mote {
 
@@ -46,7 +46,7 @@ struct GridField {
   std::size_t floats_ = 0;
 };
 
-/// A particle that goes alone (grid_tile.h) on a face; on another it may go by batches.
+/// A particle that goes alone (tile.h) on a face; on another it may go by batches.
 struct Loner {
   std::size_t face;
   std::uint32_t slot;

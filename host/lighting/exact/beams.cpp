@@ -1,4 +1,4 @@
-#include "host/lighting/beams.h"
+#include "host/lighting/exact/beams.h"
 
 #include <tbb/task_group.h>
 
