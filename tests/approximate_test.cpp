@@ -249,18 +249,43 @@ TEST(LightGrid, ConvergesToTheExactSumAsItBecomesFiner) {
        {pointLight({2, 3, 1}), pointLight({0.1f, 0, 0.1f}), directionalLight({1, -1, 0.3f})}) {
     const double distance = light.type == layout::kLightPoint && light.position.y > 1 ? std::sqrt(14.0) : 1;
     const std::vector<float> exact = transmittances(opticalDepths(tree, light, {.cutoff = 0}), light);
+    // The share of a particle before a start is taken as the mean over its kernel, not ray by ray: that is left.
+    constexpr double kLeft = 6e-4;
     double last = 1;
     for (const double cell : {1.0, 0.5, 0.25}) {
       const double length = cell * tree.meanRadius;
       const double error = meanDifference(
           exact, transmittances(
                      gridOpticalDepths(tree, slotsOf(tree), light, {.cutoff = 0}, {length / distance, length}), light));
-      EXPECT_LT(error, 0.6 * last) << cell;
+      EXPECT_LT(error, std::max(0.6 * last, kLeft)) << cell;
       last = error;
     }
     std::printf("light grid of a quarter radius: mean |dT| %.1e\n", last);
-    // The share of a particle before a start is taken as the mean over its kernel, not ray by ray: that is left.
     EXPECT_LE(last, 1.5e-3);
+  }
+}
+
+TEST(LightGrid, AFinerGridIsABetterOneAtEveryStep) {
+  // Where windows change and kernels become tents, weights must not be worse than on a coarser grid.
+  for (const layout::uint falloff : {layout::kFalloffSmooth, layout::kFalloffLinear, layout::kFalloffSphere}) {
+    const Octree tree = noiseCloud(60000, 1.5).tree(4);
+    const layout::Light light = directionalLight({1, -1, 0.3f});
+    const LightingOptions options{.falloff = falloff, .cutoff = 0};
+    const std::vector<float> exact = transmittances(opticalDepths(tree, light, options), light);
+    const auto errorOf = [&](double cell) {
+      const double length = cell * tree.meanRadius;
+      return meanDifference(
+          exact, transmittances(gridOpticalDepths(tree, slotsOf(tree), light, options, {length, 2 * length}), light));
+    };
+    double last = 1;
+    for (const double cell : {0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3}) {
+      const double error = errorOf(cell);
+      EXPECT_LT(error, 0.95 * last) << "falloff " << falloff << " cell " << cell;
+      last = error;
+    }
+    if (falloff == layout::kFalloffSmooth) {
+      EXPECT_LT(errorOf(0.4), 0.24 * errorOf(0.8));
+    }
   }
 }
 
@@ -295,8 +320,8 @@ TEST(LightGrid, TheSameBitsOnEveryInstructionSetAndAnyNumberOfThreads) {
 }
 
 TEST(Approximate, ProbesFewAndFarBetweenAreExact) {
-  for (const double range : {1.0, 10.0}) {
-    const Octree tree = noiseCloud(40000, 2, range).tree(3);
+  for (const Cloud& cloud : {noiseCloud(40000, 2), noiseCloud(40000, 2, 10), twoClusters(40000)}) {
+    const Octree tree = cloud.tree(3);
     std::vector<float> x, y, z;
     std::vector<std::uint32_t> self;
     for (std::size_t i = 0; i < 500; ++i) {

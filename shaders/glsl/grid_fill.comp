@@ -23,6 +23,13 @@ layout(constant_id = 7) const bool kColours = false;
 
 #include "lib/falloff.glsl"
 
+/// The twin of weightOfForm in host/lighting/grid/vectors-inl.h.
+float weightOfForm(float q) {
+  if (kFalloff == kFalloffLinear || kFalloff == kFalloffSphere) return falloff(q, kFalloff);
+  const float slope = 1.0 / kGridSmoothSupport, u = 1.0 - q;
+  return max(min(u * u, slope * u - (slope - 1.0)), 0.0);
+}
+
 const uint kChunks = kBlockNodes / kStoreLanes;
 const uint kMostChunks = kBlockNodes;
 const uint kKernelPairs = 4;  // of a GridKernel
@@ -45,7 +52,7 @@ float weightAt(GridKernel p, float dx, float dy, float bdy, float cdy2, vec2 uv)
     const float across = dx * uv.y - dy * uv.x;
     q = p.c < 0.0 ? p.a * (dx * dx + dy * dy + across * across) / (1.0 + uv.x * uv.x + uv.y * uv.y) : q;
   }
-  const float value = falloff(q, kFalloff);
+  const float value = weightOfForm(q);
   return kTents && p.c == 0.0 ? tent : value;
 }
 

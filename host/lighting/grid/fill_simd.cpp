@@ -75,7 +75,7 @@ HWY_INLINE void weigh(const GridParticles& p, std::size_t first, Batch& batch) {
         if constexpr (kNodes == 2) {  // a tent
           values[column] = hn::Mul(hn::Sub(one, hn::Abs(dx)), hn::Sub(one, hn::Abs(dy)));
         } else {
-          values[column] = falloffOfForm<kFalloff>(hn::Add(hn::Mul(hn::Add(hn::Mul(a, dx), bdy), dx), cdy2));
+          values[column] = weightOfForm<kFalloff>(hn::Add(hn::Mul(hn::Add(hn::Mul(a, dx), bdy), dx), cdy2));
         }
         sum = hn::Add(sum, values[column]);
         hn::StoreU(values[column], kTag, batch.weight[row * kNodes + column] + lane);

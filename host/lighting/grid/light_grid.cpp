@@ -81,7 +81,7 @@ void byTiles(const Task& task, float slack, std::vector<float>& depths) {
 
 /// A field may have so many bytes, and so many for each particle beside. With more, tiles are faster (measured): nodes
 /// are then more than particles, and a tile's stay in the caches.
-constexpr std::size_t kFieldBytes = std::size_t{2} << 20, kFieldBytesOfParticle = 20;
+constexpr std::size_t kFieldBytes = std::size_t{2} << 20, kFieldBytesOfParticle = 32;
 
 /// Calls one(slot, index) for the particles of a patch that stand on its face.
 template <class One>

@@ -3,7 +3,7 @@
 // Each particle's kernel is put down on the nodes of the cells it covers, its total kept, and is split over the bins of
 // depth by the share of it that lies in each; summed along the depth, a node holds the optical depth of the ray that
 // passes it. A receiver interpolates between four nodes and two edges of bins and takes away what it put there itself.
-// The interpolation widens kernels by a cell's variance, so they are put down narrower by as much.
+// The interpolation widens kernels, so they are put down narrower (KernelWeights in plan.h).
 //
 // The cost is linear in particles, whatever they overlap. There are two ways, the same grid but for rounding:
 //   by patches (patches.h, field.h), where the particles light themselves and the grid has not many more nodes
@@ -26,8 +26,8 @@ struct GridResolution {
 
 /// As opticalDepths, approximately. Point lights: particles within four radii of the light are added exactly.
 /// `light.castsShadows == 0` or `shadowDensity == 0` gives zeros. The same bits on any number of threads and any
-/// instruction set. About 0.05 µs a particle and thread for cells of 0.8 radii or more, 0.2 at 0.3. By patches it takes
-/// at most 20 bytes a particle beside the result and 2 MiB, tile by tile 18 and one tile a thread.
+/// instruction set. About 0.05 µs a particle and thread for cells of 0.8 radii or more, 0.1 at 0.45, 0.2 at 0.3. By
+/// patches it takes at most 32 bytes a particle beside the result and 2 MiB, tile by tile 18 and one tile a thread.
 std::vector<float> gridOpticalDepths(const Octree& tree, const Receivers& receivers, const layout::Light& light,
                                      const LightingOptions& options, const GridResolution& resolution,
                                      std::span<const std::uint8_t> reached = {}, const RaysDone& done = {});

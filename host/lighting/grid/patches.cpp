@@ -59,9 +59,10 @@ bool cover(const Extent& extent, const GridShape& shape, GridPatch& patch) {
 
 /// Half width of a kernel [cells] (placeParticles); an upper bound where `z` is a lower and `slope` an upper one.
 double halfWidth(double radius, double z, double slope, const GridShape& shape) {
-  const double cells = radius / (shape.resolution.cell * z), tent = shape.moments.tentSquare();
-  const double square = cells * cells - tent;
-  return square > tent ? std::max(std::sqrt(square * (1 + slope * slope)), 1.0) : 1.0;
+  const double cells = radius / (shape.resolution.cell * z), square = cells * cells;
+  if (!(square > shape.weights.tentBelow)) return 1;
+  const double wide = shape.weights.support * shape.weights.narrowed(square);
+  return std::max(std::sqrt(wide * (1 + slope * slope)), 1.0);
 }
 
 class Planner {

@@ -71,7 +71,7 @@ void locateAll(const LocatePoints& points, const GridShape& shape, double* keys,
   const double cell = shape.resolution.cell, size = shape.tileCells;
   const Vec perCell = set(1 / cell), perTile = set(1 / size), zero = hn::Zero(kTag), one = set(1);
   const Vec half = set(1 << 23), most = set((1 << 24) - 1);
-  const Vec tent = set(shape.moments.tentSquare());
+  const Vec tentBelow = set(shape.weights.tentBelow), narrowing = set(shape.weights.narrowing);
   constexpr double kSlack = 1e-3;  // nodes: rounding may go either way
   const auto part = [&](std::size_t i, std::size_t count) {
     float padded[4][8] = {};
@@ -94,11 +94,10 @@ void locateAll(const LocatePoints& points, const GridShape& shape, double* keys,
         hn::Add(hn::Mul(hn::Add(hn::Mul(at.face, set(1 << 24)), number(row)), set(1 << 24)), number(column));
     const Vec final = hn::IfThenElse(at.nowhere, set(kNoTile), key);
     // How far a kernel's nodes reach, on the face of the centre.
-    const Vec cells = hn::Div(hn::Mul(r, perCell), at.z);
-    const Vec narrowed = hn::Sub(square(cells), tent);
-    Vec wide = hn::Sqrt(hn::Max(narrowed, tent));
+    const Vec cells2 = square(hn::Div(hn::Mul(r, perCell), at.z));
+    Vec wide = hn::Sqrt(hn::Mul(set(shape.weights.support), hn::Sub(hn::Max(cells2, tentBelow), narrowing)));
     if (perspective) wide = hn::Mul(wide, hn::Sqrt(hn::Add(one, hn::Max(square(at.u), square(at.v)))));
-    const Vec reach = hn::IfThenElse(hn::Gt(narrowed, tent), wide, one);
+    const Vec reach = hn::IfThenElse(hn::Gt(cells2, tentBelow), wide, one);
     const Vec inX = hn::Sub(x, hn::Mul(column, set(size))), inY = hn::Sub(y, hn::Mul(row, set(size)));
     const auto before = [&](Vec in) { return hn::Le(hn::Sub(in, reach), set(kSlack)); };
     const auto behind = [&](Vec in) { return hn::Ge(hn::Add(in, reach), set(size - kSlack)); };
@@ -189,8 +188,10 @@ void placeKernels(GridTile& tile) {
   GridParticles& to = tile.particles;
   const bool perspective = tile.frame.perspective;
   const KernelMoments& moments = tile.shape->moments;
+  const KernelWeights& weights = tile.shape->weights;
   const Vec perCell = set(1 / tile.shape->resolution.cell), perBin = set(1 / tile.bin), base = set(tile.depthBase);
-  const Vec zero = hn::Zero(kTag), one = set(1), tent = set(moments.tentSquare()), mass = set(kPi * moments.mass);
+  const Vec zero = hn::Zero(kTag), one = set(1), mass = set(kPi * moments.mass);
+  const Vec tentBelow = set(weights.tentBelow), narrowing = set(weights.narrowing), support = set(weights.support);
   for (std::size_t i = 0; i < to.points.count; i += lanes()) {
     const InFrame at = placeInFrame(tile, to.points, i);
     const Vec r = widen(&to.radius[i]);
@@ -209,8 +210,9 @@ void placeKernels(GridTile& tile) {
       shown = hn::And(shown, hn::And(hn::Ge(at.depth, hn::Mul(set(kNearLightRadii / 2), r)),
                                      hn::Gt(at.z, hn::Mul(set(kLeastCosine / 2), at.depth))));
     }
-    const Vec narrowed = hn::Max(hn::Sub(square(cells), tent), tent);
-    Vec half = hn::IfThenElse(hn::Gt(narrowed, tent), hn::Mul(hn::Sqrt(narrowed), reach), one);
+    const Vec narrowed = hn::Sub(hn::Max(square(cells), tentBelow), narrowing);
+    const Vec wide = hn::Mul(hn::Sqrt(hn::Mul(support, narrowed)), reach);
+    Vec half = hn::IfThenElse(hn::Gt(square(cells), tentBelow), wide, one);
     Vec total = hn::Mul(hn::Mul(mass, square(cells)), stretch), curved = zero;
     if (perspective) {
       const Mask bent = hn::And(shown, hn::Lt(at.depth, hn::Mul(set(kCurvedRadii), r)));

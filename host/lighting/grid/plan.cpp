@@ -220,8 +220,16 @@ KernelMoments kernelMoments(layout::uint falloff) {
   }
 }
 
+KernelWeights kernelWeights(layout::uint falloff) {
+  switch (falloff) {
+    case layout::kFalloffLinear: return {1.9, 0.65, 1};
+    case layout::kFalloffSphere: return {1.4, 0.4, 1};
+    default: return {2.25, 0.73, layout::kGridSmoothSupport};
+  }
+}
+
 GridShape gridShape(const layout::Light& light, const GridResolution& resolution, layout::uint falloff) {
-  return {facesOf(light), resolution, kTileCells, kernelMoments(falloff)};
+  return {facesOf(light), resolution, kTileCells, kernelMoments(falloff), kernelWeights(falloff)};
 }
 
 NodeRange curvedNodeRange(const dvec3& centre, double radius, const LightFrame& face, double cell) {
@@ -236,13 +244,13 @@ NodeRange curvedNodeRange(const dvec3& centre, double radius, const LightFrame& 
 
 NodeRange nodeRange(const dvec3& centre, double radius, const LightFrame& face, const GridShape& shape) {
   const double cell = shape.resolution.cell, z = face.perspective ? glm::dot(centre, face.axis) : 1;
-  const double cells = radius / (z * cell), tent = shape.moments.tentSquare();
-  const double square = std::max(cells * cells - tent, tent);
+  const double cells = radius / (z * cell), square = cells * cells;
+  const double support = std::sqrt(shape.weights.support * shape.weights.narrowed(square));
   if (face.perspective && glm::length(centre) < kCurvedRadii * radius)
-    return curvedNodeRange(centre, std::sqrt(square) * z * cell, face, cell);
+    return curvedNodeRange(centre, support * z * cell, face, cell);
   const dvec2 place(glm::dot(centre, face.u) / z, glm::dot(centre, face.v) / z);
   dvec2 half(1);
-  if (square > tent) half = std::sqrt(square) * (face.perspective ? sqrt(1.0 + place * place) : dvec2(1));
+  if (square > shape.weights.tentBelow) half = support * (face.perspective ? sqrt(1.0 + place * place) : dvec2(1));
   return {place / cell - half, place / cell + half};
 }
 

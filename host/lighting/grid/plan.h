@@ -1,5 +1,6 @@
 // Which tiles a light grid has, and what belongs to each (light_grid.h).
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -7,25 +8,34 @@
 #include "host/core/raw_vector.h"
 #include "host/lighting/exact/column.h"
 #include "host/lighting/grid/light_grid.h"
+#include "shaders/glsl/layout/grid.h"
 
 namespace mote {
 
 /// Particles nearer to a point light than this many radii are not ellipses on a cube's face: at its corners a second
 /// order of (r/ρ) would be off by a tenth of their mass at ten radii.
 constexpr double kCurvedRadii = 32;
-/// A tent over a cell has a variance of so much of the cell's square along each axis. The interpolation adds it, so
-/// kernels are put down narrower by as much; what would be narrower than a tent then is put down as one, on the four
-/// nodes about its centre.
-constexpr double kTentVariance = 1.0 / 6;
-
 /// What follows from the falloff F(q): its integral over the unit disc is π · mass, and its variance along one axis
 /// `variance` of r².
 struct KernelMoments {
   double mass, variance;
-  /// The square of the radius of a kernel that has a tent's variance [cells²].
-  double tentSquare() const { return kTentVariance / variance; }
 };
 KernelMoments kernelMoments(layout::uint falloff);
+
+/// How a kernel is put down on nodes, so that what receivers find between them comes nearest to it. Interpolation
+/// widens it by a tent over a cell, so it is put down narrower. The margin of a smooth kernel, where F(q) is small, is
+/// left out: its nodes are better spent on a finer grid. There weights are F(q) or the line that meets it at q = 0 and
+/// is 0 at `support`, whichever is less. All of it is chosen for the least mean square over the plane, of which
+/// tools/bench/fit_grid_kernels.py has the numbers: up to five nodes across, within 18 % of the best weights on as
+/// many.
+struct KernelWeights {
+  double tentBelow;  ///< the square of the radius [cells²] up to which it is a tent, on the four nodes about its centre
+  double narrowing;  ///< taken from the square of the radius [cells²]
+  double support;    ///< q from which on weights are 0
+  /// The square of the radius that q = 1 has when it is put down [cells²].
+  double narrowed(double square) const { return std::max(square, tentBelow) - narrowing; }
+};
+KernelWeights kernelWeights(layout::uint falloff);
 
 /// Along a tile's edge: wide enough that few particles lie in several, and their nodes still pass through the caches.
 constexpr int kTileCells = 32;
@@ -37,6 +47,7 @@ struct GridShape {
   GridResolution resolution;
   int tileCells = 0;  ///< along a tile's edge
   KernelMoments moments{};
+  KernelWeights weights{};
 
   bool perspective() const { return faces.front().perspective; }
 };

@@ -55,9 +55,14 @@ HWY_INLINE void addTo(float* to, float weight, const Group& shares) {
   }
 }
 
-/// F of a quadratic form, which rounding may have taken below 0.
+/// Weights of a quadratic form, which rounding may have taken below 0 (KernelWeights).
 template <layout::uint kFalloff>
-HWY_INLINE Vec falloffOfForm(Vec q) {
+HWY_INLINE Vec weightOfForm(Vec q) {
+  if constexpr (kFalloff == layout::kFalloffSmooth) {
+    constexpr float kSlope = 1 / layout::kGridSmoothSupport;
+    const Vec u = hn::Sub(set(1), q), line = hn::Sub(hn::Mul(set(kSlope), u), set(kSlope - 1));
+    return hn::Max(hn::Min(hn::Mul(u, u), line), hn::Zero(kTag));
+  }
   if constexpr (kFalloff == layout::kFalloffLinear) q = hn::Max(q, hn::Zero(kTag));
   return falloffOf<kFalloff>(kTag, q);
 }

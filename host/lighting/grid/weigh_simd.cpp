@@ -44,7 +44,7 @@ HWY_NOINLINE void weighAll(GridTile& tile, float* scales) {
       const auto tent = hn::Gt(load(window.tent + lane), zero);
       const auto weight = [&](Vec dx, Vec dy) {
         const Vec q = hn::Add(hn::Mul(hn::Add(hn::Mul(a, dx), hn::Mul(b, dy)), dx), hn::Mul(c, hn::Mul(dy, dy)));
-        return falloffOfForm<kFalloff>(q);
+        return weightOfForm<kFalloff>(q);
       };
       const Vec intoX = hn::Sub(x, hn::Floor(x)), intoY = hn::Sub(y, hn::Floor(y));
       Vec sum = one;  // of a tent
