@@ -6,6 +6,7 @@
 #include "host/core/parallel.h"
 #include "host/lighting/exact/beam_kernel.h"
 #include "host/lighting/exact/beams.h"
+#include "host/lighting/exact/ray.h"
 #include "host/lighting/irradiance.h"
 
 namespace mote {
@@ -15,7 +16,6 @@ namespace {
 struct Workspace {
   Column column;
   Beam beam;
-  ColumnBlocks blocks;
 };
 Workspace& workspace() {
   static thread_local Workspace ofThisThread;
@@ -116,38 +116,20 @@ std::vector<float> opticalDepths(const Octree& tree, const layout::Light& light,
 
 std::vector<float> opticalDepthsOfFew(const Octree& tree, const Receivers& receivers, const layout::Light& light,
                                       const LightingOptions& options) {
-  // What is found for a column is looked at by each of its rays: few of them, so that it is not much.
-  constexpr std::size_t kMostRays = 64;
   std::vector<float> depths(tree.channels() * receivers.size(), 0.0f);
   if (shadowless(light) || tree.particleCount() == 0) return depths;
-  const SumOptions rules = sumOptions(light, options);
-  const BeamKernel& kernel = simdBeamKernel();
-  const ColumnRules shape = columnRules(tree, light, receivers.bounds());
-  const Beams beams = planBeams(receivers, light, {}, tree.meanRadius, {kMostRays, kMostRays});
-  parallelBlocks(beams.columns(), 1, [&](std::size_t c, std::size_t) {
-    Workspace& work = workspace();
-    Column& column = work.column;
-    const std::span<const std::uint32_t> members = beams.ofColumn(c);
-    const auto put = [&](std::uint32_t receiver, std::size_t channel, float sum) {
-      depths[channel * receivers.size() + receiver] = sum;
-    };
-    column.setRays(receivers, light, members, shape);
-    kernel.gather(tree, column);
-    kernel.place(column);
-    work.beam.setRays(column, receivers, members, true);
-    const auto end = column.placed.place.begin() + static_cast<std::ptrdiff_t>(column.gathered.count);
-    if (std::find(column.placed.place.begin(), end, Place::NearLight) != end) {
-      column.sort(tree.channels());
-      sumBeamRays(tree, kernel, rules, work, put);
-      return;
-    }
-    boundBlocks(column, work.beam, work.blocks);
-    for (std::size_t k = 0; k < members.size(); ++k) {
-      float sums[3];
-      sumAlone(column, work.blocks, work.beam, k, tree.channels(), rules, sums);
-      for (std::size_t channel = 0; channel < tree.channels(); ++channel)
-        put(work.beam.rays.receiver[k], channel, sums[channel]);
-    }
+  const float slack = columnRules(tree, light, receivers.bounds()).slack;
+  // Neighbours go together.
+  const Beams beams = planBeams(receivers, light, {}, tree.meanRadius, {kPacketRays, kPacketRays});
+  parallelBlocks(beams.receiver.size(), kPacketRays, [&](std::size_t begin, std::size_t end) {
+    const auto members = std::span(beams.receiver).subspan(begin, end - begin);
+    std::vector<Ray> rays;
+    for (const std::uint32_t receiver : members) rays.push_back(rayToLight(receivers, receiver, light));
+    float sums[3][kPacketRays];
+    sumRays(tree, rays, options.falloff, options.endpoint, slack, sums);
+    for (std::size_t channel = 0; channel < tree.channels(); ++channel)
+      for (std::size_t k = 0; k < members.size(); ++k)
+        depths[channel * receivers.size() + members[k]] = sums[channel][k];
   });
   return depths;
 }

@@ -48,7 +48,8 @@ std::vector<float> opticalDepths(const Octree& tree, const layout::Light& light,
                                  const RaysDone& done = {});
 
 /// … from receivers so few and far between that rays have little of their way in common: as opticalDepths but for
-/// rounding, in a third of the time for a few thousand of a million.
+/// rounding, and without a cut-off. About 6 µs a ray and thread at 1 M particles: a tenth of the time for a few
+/// thousand.
 std::vector<float> opticalDepthsOfFew(const Octree& tree, const Receivers& receivers, const layout::Light& light,
                                       const LightingOptions& options);
 

@@ -24,19 +24,6 @@ struct PacketSums {
   alignas(64) float of[3][kPacketRays];
 };
 
-/// Rectangles in the column's frame, each around sixteen neighbours of column.gathered: who crosses elsewhere, or
-/// starts no deeper than `behind`, meets none.
-struct ColumnBlocks {
-  std::vector<float> lowU, highU, lowV, highV, behind;
-};
-void boundBlocks(const Column& column, const Beam& beam, ColumnBlocks& blocks);
-
-/// Optical depth along one ray of a careful beam, in each of the tree's channels: of all that is placed in the column
-/// and not near the light, in any order, a vector of particles at a time. For rays so far from each other that beams do
-/// not pay. The same bits on every instruction set.
-void sumAlone(const Column& column, const ColumnBlocks& blocks, const Beam& beam, std::size_t ray, std::size_t channels,
-              const SumOptions& options, float (&sums)[3]);
-
 /// One way of doing all four.
 struct BeamKernel {
   /// Particles of the tree whose support may touch the column, into column.gathered, in slot order.

@@ -1,8 +1,6 @@
 // The steps of beam_scalar.cpp on vectors, compiled once for each instruction set (Google Highway). No multiply-add is
 // fused, so that every instruction set and the scalar path round alike.
-#include <bit>
 #include <cmath>
-#include <limits>
 
 #include "host/core/error.h"
 #include "host/lighting/exact/beam_kernel.h"
@@ -409,123 +407,6 @@ void sum(const Column& column, const Beam& beam, std::size_t packet, std::size_t
   });
 }
 
-// ---- one ray
-
-/// softShare and the hard end, with everything a vector.
-template <layout::uint kFalloff, layout::uint kEndpoint>
-HWY_INLINE Vec shareAtStart(Vec q, Vec t, Vec radius) {
-  const Vec zero = hn::Zero(kTag);
-  if constexpr (kEndpoint == layout::kEndpointClamp) {
-    const Vec back = hn::Div(hn::Min(t, zero), radius);
-    return falloffOf<kFalloff>(kTag, hn::Add(q, hn::Mul(back, back)));
-  } else {
-    const Vec s = hn::Sqrt(hn::Max(hn::Sub(hn::Set(kTag, 1.0f), q), zero));
-    return hn::Mul(falloffOf<kFalloff>(kTag, q), capOf(t, hn::Mul(radius, s)));
-  }
-}
-
-void boundAll(const Column& column, const Beam& beam, ColumnBlocks& blocks) {
-  const PlacedParticles& p = column.placed;
-  const std::size_t count = column.gathered.count, number = (count + kPacketRays - 1) / kPacketRays;
-  const Vec infinite = hn::Set(kTag, std::numeric_limits<float>::infinity()), scale = hn::Set(kTag, beam.extentScale);
-  for (auto* array : {&blocks.lowU, &blocks.highU, &blocks.lowV, &blocks.highV, &blocks.behind})
-    array->resize(number + kPacketRays);
-  const auto bound = [&](const std::vector<float>& places, float slack, std::vector<float>& lows,
-                         std::vector<float>& highs) {
-    for (std::size_t block = 0; block < number; ++block) {
-      Vec low = infinite, high = hn::Neg(infinite);
-      for (std::size_t i = block * kPacketRays; i < std::min(count, (block + 1) * kPacketRays); i += kLanes) {
-        const Vec place = hn::LoadU(kTag, &places[i]), extent = hn::Mul(hn::LoadU(kTag, &p.extent[i]), scale);
-        const auto valid = hn::FirstN(kTag, count - i);
-        low = hn::Min(low, hn::IfThenElse(valid, hn::Sub(place, extent), infinite));
-        high = hn::Max(high, hn::IfThenElse(valid, hn::Add(place, extent), hn::Neg(infinite)));
-      }
-      lows[block] = hn::GetLane(hn::MinOfLanes(kTag, low)) - slack;
-      highs[block] = hn::GetLane(hn::MaxOfLanes(kTag, high)) + slack;
-    }
-  };
-  for (std::size_t block = 0; block < number; ++block) {
-    Vec nearest = infinite;
-    for (std::size_t i = block * kPacketRays; i < std::min(count, (block + 1) * kPacketRays); i += kLanes)
-      nearest = hn::Min(nearest, hn::IfThenElse(hn::FirstN(kTag, count - i), hn::LoadU(kTag, &p.behind[i]), infinite));
-    blocks.behind[block] = hn::GetLane(hn::MinOfLanes(kTag, nearest)) - column.margin;
-  }
-  constexpr float kSlack = 1e-6f;  // what rounding does to places
-  bound(p.u, kSlack * std::max(std::abs(beam.lowU), std::abs(beam.highU)), blocks.lowU, blocks.highU);
-  bound(p.v, kSlack * std::max(std::abs(beam.lowV), std::abs(beam.highV)), blocks.lowV, blocks.highV);
-}
-
-/// Calls one(block) for those that a ray at u, v crosses before it starts, ascending.
-template <class One>
-HWY_INLINE void eachCrossed(const ColumnBlocks& blocks, std::size_t number, Vec u, Vec v, Vec start, const One& one) {
-  for (std::size_t first = 0; first < number; first += kLanes) {
-    const auto load = [first](const std::vector<float>& from) { return hn::LoadU(kTag, from.data() + first); };
-    const auto inU = hn::And(hn::Le(load(blocks.lowU), u), hn::Ge(load(blocks.highU), u));
-    const auto inV = hn::And(hn::Le(load(blocks.lowV), v), hn::Ge(load(blocks.highV), v));
-    const auto ahead = hn::And(hn::Lt(load(blocks.behind), start), hn::FirstN(kTag, number - first));
-    const auto crossed = hn::And(hn::And(inU, inV), ahead);
-    if (hn::AllFalse(kTag, crossed)) continue;
-    std::uint8_t bytes[8] = {};
-    hn::StoreMaskBits(kTag, crossed, bytes);
-    for (unsigned bits = bytes[0] | static_cast<unsigned>(bytes[1]) << 8; bits != 0; bits &= bits - 1)
-      one(first + static_cast<std::size_t>(std::countr_zero(bits)));
-  }
-}
-
-template <int kChannels, layout::uint kFalloff, layout::uint kEndpoint>
-HWY_NOINLINE void sumRay(const Column& column, const ColumnBlocks& blocks, const Beam& beam, std::size_t ray,
-                         float (&sums)[3]) {
-  const hn::RebindToUnsigned<Tag> slotTag;
-  const PlacedParticles& p = column.placed;
-  const GatheredParticles& found = column.gathered;
-  const BeamRays& rays = beam.rays;
-  const auto set = [](float x) { return hn::Set(kTag, x); };
-  const Vec u = set(rays.u[ray]), uLow = set(rays.uLow[ray]), v = set(rays.v[ray]), vLow = set(rays.vLow[ray]),
-            slopeU = set(rays.slopeU[ray]), slopeV = set(rays.slopeV[ray]), norm = set(rays.inverseNorm[ray]),
-            depth = set(rays.depth[ray]), depthLow = set(rays.depthLow[ray]), one = set(1), quarter = set(0.25f);
-  const auto self = hn::Set(slotTag, rays.self[ray]);
-  alignas(64) float lanes[kChannels][kPacketRays] = {};
-  eachCrossed(blocks, (found.count + kPacketRays - 1) / kPacketRays, u, v, depth, [&](std::size_t block) {
-    for (std::size_t lane = 0; lane < kPacketRays; lane += kLanes) {
-      const std::size_t i = block * kPacketRays + lane;
-      const auto load = [i](const std::vector<float>& from) { return hn::LoadU(kTag, from.data() + i); };
-      const Vec du = hn::Add(hn::Sub(load(p.u), u), hn::Sub(load(p.uLow), uLow)),
-                dv = hn::Add(hn::Sub(load(p.v), v), hn::Sub(load(p.vLow), vLow));
-      const Vec cross = hn::Sub(hn::Mul(du, slopeV), hn::Mul(dv, slopeU));
-      const Vec q = hn::Mul(dot3(du, dv, cross, du, dv, cross), hn::Mul(load(p.inverseArea), norm));
-      auto met = hn::Lt(q, one);
-      if (i + kLanes > found.count) met = hn::And(met, hn::FirstN(kTag, i < found.count ? found.count - i : 0));
-      if (hn::AllFalse(kTag, met)) continue;
-      const Vec radius = load(found.radius), b2 = hn::Mul(q, hn::Mul(radius, radius));
-      Vec t = hn::Add(hn::Sub(depth, load(p.depth)), hn::Sub(depthLow, load(p.depthLow)));
-      if (column.frame.perspective) {
-        const Vec inner = hn::Mul(quarter, hn::Mul(b2, load(p.sagRatio)));
-        t = hn::Add(t, hn::Mul(hn::Mul(b2, load(p.sagFirst)), hn::Add(one, inner)));
-      }
-      met = hn::And(met, hn::RebindMask(kTag, hn::Ne(hn::LoadU(slotTag, found.slot.data() + i), self)));
-      const Vec share = hn::IfThenElseZero(met, shareAtStart<kFalloff, kEndpoint>(q, t, radius));
-      for (int c = 0; c < kChannels; ++c) {
-        const Vec added = hn::IfThenElseZero(met, hn::Mul(load(found.peak[c]), share));
-        hn::Store(hn::Add(hn::Load(kTag, lanes[c] + lane), added), kTag, lanes[c] + lane);
-      }
-    }
-  });
-  for (int c = 0; c < kChannels; ++c) {
-    sums[c] = 0;
-    for (const float part : lanes[c]) sums[c] += part;
-  }
-}
-
-void sumOne(const Column& column, const ColumnBlocks& blocks, const Beam& beam, std::size_t ray, std::size_t channels,
-            const SumOptions& options, float (&sums)[3]) {
-  withRule(options.falloff, options.endpoint, [&]<layout::uint kFalloff, layout::uint kEndpoint>() {
-    if (channels == 1)
-      sumRay<1, kFalloff, kEndpoint>(column, blocks, beam, ray, sums);
-    else
-      sumRay<3, kFalloff, kEndpoint>(column, blocks, beam, ray, sums);
-  });
-}
-
 }  // namespace mote::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -536,16 +417,6 @@ HWY_EXPORT(gather);
 HWY_EXPORT(place);
 HWY_EXPORT(choose);
 HWY_EXPORT(sum);
-HWY_EXPORT(boundAll);
-HWY_EXPORT(sumOne);
-
-void boundBlocks(const Column& column, const Beam& beam, ColumnBlocks& blocks) {
-  HWY_DYNAMIC_DISPATCH(boundAll)(column, beam, blocks);
-}
-void sumAlone(const Column& column, const ColumnBlocks& blocks, const Beam& beam, std::size_t ray, std::size_t channels,
-              const SumOptions& options, float (&sums)[3]) {
-  HWY_DYNAMIC_DISPATCH(sumOne)(column, blocks, beam, ray, channels, options, sums);
-}
 
 const BeamKernel& simdBeamKernel() {
   static const BeamKernel kernel{[](const Octree& tree, Column& column) {
