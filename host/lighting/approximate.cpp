@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
+#include <utility>
 
 #include "host/lighting/level_of_detail.h"
 
@@ -15,32 +17,33 @@ constexpr double kAim = 0.85;
 
 // ---- the light grid
 
-/// Cells [radii] are taken from a ladder of eighth roots of 2, so that a slow motion of light or cloud seldom changes
-/// the grid. Coarser cells than the first save next to nothing.
-constexpr double kLadder = 8;
-constexpr double kCoarsest = 1.7, kFinest = 0.2;
+/// Cells [radii] are taken from a ladder of sixteenth roots of 2, so that a slow motion of light or cloud seldom
+/// changes the grid. Coarser cells than the first save next to nothing.
+constexpr double kLadder = 16;
+constexpr double kCoarsest = 1.2, kFinest = 0.2;
 /// Bins of depth [cells]: what a finer one would save of the error costs more than a smaller cell does.
 constexpr double kBinCells = 2;
 
-double onLadder(double cellRadii) {
-  return std::exp2(std::floor(std::log2(std::clamp(cellRadii, kFinest, kCoarsest)) * kLadder + 1e-6) / kLadder);
-}
+double rung(int number) { return kCoarsest * std::exp2(-number / kLadder); }
 /// So that a slow motion does not change the grid.
 double rounded(double x) { return std::exp2(std::round(std::log2(x) * 16) / 16); }
 
-/// The cell [radii] that is expected to leave a mean |ΔT| of `error`. A cell blurs what lies beside a ray into it, so
-/// its error follows from the roughness, whatever the cloud.
+/// The mean |ΔT| that a grid is expected to leave. Between nodes it finds what lies on the straight line from one to
+/// the next, so its error goes as the transmittance bends over half a cell, whatever the cloud.
 ///
-/// Measured for noise clouds (r of 1.5 and of 4 spacings, mean τ 0.1, 4, 50, 0.3 and 1.5 M particles), balls, plumes
-/// and smoke1: a cell of one radius leaves 0.32 of the roughness at one radius (0.22 where many overlap, 0.45 at radii
-/// 10:1). How it goes on from there follows the slope (0.78 at r of 1.5 spacings, 0.95 at 4, 0.45 at radii 10:1): as
-/// h^(1.4 slope) for coarser cells, h^(2.1 slope) down to half a radius, h^(2.8 slope) below.
-double cellFor(double error, const Roughness& roughness) {
-  const double slope = roughness.slope(), atOne = 0.32 * std::max(roughness.whole, 1e-12);
-  const double atHalf = atOne * std::pow(0.5, 2.1 * slope);
-  if (error > atOne) return std::pow(error / atOne, 1 / (1.4 * slope));
-  if (error > atHalf) return std::pow(error / atOne, 1 / (2.1 * slope));
-  return 0.5 * std::pow(error / atHalf, 1 / (2.8 * slope));
+/// Measured for noise clouds (r of 1.5 and of 4 spacings, radii 10:1, mean τ 0.1, 4 and 50, 0.2 to 1 M particles, all
+/// falloffs), balls, plumes and smoke1: within 15 % for most, 35 % at a τ of 50.
+double gridError(double cellRadii, const Roughness& roughness) {
+  // Of what the bend is: by log2 of the cell.
+  constexpr std::pair<double, double> kShares[] = {{-2.3, 1.1}, {-2, 0.94},   {-1.5, 0.86},
+                                                   {-1, 0.92},  {-0.5, 1.13}, {0, 1.25}};
+  const double x = std::clamp(std::log2(cellRadii), kShares[0].first, std::end(kShares)[-1].first);
+  const auto* next = std::begin(kShares) + 1;
+  while (next->first < x) ++next;
+  const double share = glm::mix(next[-1].second, next->second, (x - next[-1].first) / (next->first - next[-1].first));
+  // Where the slope is small radii differ: below, more and more of the small particles are smooth.
+  const double slope = roughness.slope(), below = slope + 2 * std::max(1 - slope, 0.0);
+  return share * roughness.quarter * std::pow(2 * cellRadii, cellRadii < 0.5 ? below : slope);
 }
 
 // ---- costs
@@ -49,8 +52,8 @@ double cellFor(double error, const Roughness& roughness) {
 // same within a factor of 1.5 on every instruction set, and on a device.
 
 double gridCost(double cellRadii) {
-  const double across = 2 * std::sqrt(std::max(1 / (cellRadii * cellRadii) - 1.333, 0.25));  // cells of a kernel
-  return 0.055 + 0.0045 * (across + 1) * (across + 1);
+  const double across = 2 * std::sqrt(0.75 * std::max(1 / (cellRadii * cellRadii) - 0.73, 0.25));  // cells of a kernel
+  return 0.03 + 0.0043 * (across + 1) * (across + 1);
 }
 
 /// What an endless ray meets: its share of the discs on the cloud's cross-section; clouds clump by about two.
@@ -96,17 +99,17 @@ class Search {
     const double probing = static_cast<double>(probes_.rays()) * probeCost(met_) / std::max(reached, 1.0);
     if (probes_.count() == 0 || gridCost(kCoarsest) + probing >= exactCost(met_)) return {};
     probes_.lightExactly(radius_);
-    cell_ = onLadder(cellFor(kAim * error, probes_.roughness()));
+    coarsestFor(kAim * error);
     tolerance_ = kDetailMargin * error;
     while (chosen.tries < kMostTries) {
-      const double grid = cell_ >= kFinest ? gridCost(cell_) : INFINITY, detail = detailCostNow(grid);
+      const double grid = cell_ > 0 ? gridCost(cell_) : INFINITY, detail = detailCostNow(grid);
       if (std::min(grid, detail) >= exactCost(met_)) return {};
       const RaysDone once = chosen.tries == 0 ? done : RaysDone{};
       std::vector<float> depths = grid <= detail ? byGrid(chosen, once) : byDetail(chosen, once);
       ++chosen.tries;
       chosen.error = probes_.measure(depths);
       if (chosen.error.upper <= error) return depths;
-      refine(chosen.method, kAim * error / chosen.error.mean);
+      refine(chosen.method, kAim * error, chosen.error.mean);
     }
     return {};
   }
@@ -138,14 +141,19 @@ class Search {
     return lodOpticalDepths(detail, receivers_, light_, options_, sources_.exact, reached_, done);
   }
 
-  /// `ratio`: of what is aimed at to what was found.
-  void refine(DepthMethod method, double ratio) {
+  /// The first rung, from `rung_` on, whose expected error is as small; a cell of 0 where there is none.
+  void coarsestFor(double error) {
+    while (rung(rung_) >= kFinest && gridError(rung(rung_), probes_.roughness()) * worse_ > error) ++rung_;
+    cell_ = rung(rung_) >= kFinest ? rung(rung_) : 0;
+  }
+
+  void refine(DepthMethod method, double aim, double found) {
     if (method == DepthMethod::Detail) {
-      tolerance_ *= std::min(std::pow(ratio, 1 / kDetailPower), 0.8);
-    } else {  // as the model's slope has it, and at least a step
-      const double finer = cell_ * std::pow(ratio, 1 / (2.1 * probes_.roughness().slope()));
-      cell_ = std::min(onLadder(finer), cell_ * std::exp2(-1 / kLadder));
-      if (finer < kFinest) cell_ = finer > 0.9 * kFinest && cell_ < kFinest ? kFinest : 0;
+      tolerance_ *= std::min(std::pow(aim / found, 1 / kDetailPower), 0.8);
+    } else {
+      worse_ = found / gridError(cell_, probes_.roughness());
+      ++rung_;
+      coarsestFor(aim);
     }
   }
 
@@ -157,6 +165,8 @@ class Search {
   const DepthSources& sources_;
   ErrorProbes probes_;
   double met_, radius_, cell_ = 0, tolerance_ = 0;
+  int rung_ = 0;
+  double worse_ = 1;  // of what a grid left to what was expected
   std::optional<TreeSums> sums_;
 };
 

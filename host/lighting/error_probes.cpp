@@ -12,8 +12,9 @@ namespace {
 constexpr double kQuantile = 2.326;
 /// Sets the probes apart from everything else that an index decides.
 constexpr std::uint64_t kProbeStream = 0xe4405;
-/// Probes that have rays beside them.
-constexpr std::size_t kBesides = 384;
+/// Probes that have rays beside them, in a line across the light's way: at so many mean radii.
+constexpr std::size_t kBesides = 192;
+constexpr double kLine[] = {-0.5, -0.25, 0.25, 0.5};
 
 /// Points that are receivers of their own.
 struct Points {
@@ -27,7 +28,9 @@ struct Points {
 
 }  // namespace
 
-double Roughness::slope() const { return whole > 0 && half > 0 ? std::clamp(std::log2(whole / half), 0.3, 1.0) : 1; }
+double Roughness::slope() const {
+  return quarter > 0 && half > 0 ? std::clamp(std::log2(half / quarter), 0.5, 2.0) : 2;
+}
 
 ErrorProbes::ErrorProbes(const Octree& tree, const Receivers& receivers, const layout::Light& light,
                          const LightingOptions& options, std::span<const std::uint8_t> reached)
@@ -48,13 +51,13 @@ std::size_t ErrorProbes::besides() const { return std::min(kBesides, count()); }
 void ErrorProbes::lightExactly(double radius) {
   Points points;
   for (const std::uint32_t k : index_) points.add(receivers_.position(k), receivers_.selfOf(k));
-  for (const double distance : {0.5 * radius, radius})  // across the light's way
+  for (const double place : kLine)
     for (std::size_t i = 0; i < besides(); ++i) {
       const dvec3 start(receivers_.position(index_[i]));
       const dvec3 way =
           light_.type == layout::kLightDirectional ? dvec3(light_.direction) : start - dvec3(light_.position);
       const dvec3 across = glm::cross(way, Random(kProbeStream, i).direction());
-      const dvec3 beside = start + (glm::length(across) > 0 ? glm::normalize(across) * distance : dvec3(0));
+      const dvec3 beside = start + (glm::length(across) > 0 ? glm::normalize(across) * (place * radius) : dvec3(0));
       points.add(vec3(beside), receivers_.selfOf(index_[i]));
     }
   const std::vector<float> found = transmittances(opticalDepthsOfFew(tree_, points.receivers(), light_, options_),
@@ -65,12 +68,15 @@ void ErrorProbes::lightExactly(double radius) {
   for (std::size_t c = 0; c < channels; ++c) {
     const float* own = found.data() + c * rays();
     std::copy_n(own, count(), exact_.data() + c * count());
-    const auto meanDifference = [&](const float* beside) {
+    const float* line[] = {own + count(), own + count() + besides(), own, own + count() + 2 * besides(),
+                           own + count() + 3 * besides()};
+    const auto meanBend = [&](int middle, int apart) {
       double sum = 0;
-      for (std::size_t i = 0; i < besides(); ++i) sum += std::abs(double(own[i]) - double(beside[i]));
+      for (std::size_t i = 0; i < besides(); ++i)
+        sum += std::abs(double(line[middle][i]) - 0.5 * (double(line[middle - apart][i]) + line[middle + apart][i]));
       return sum / static_cast<double>(besides() * channels);
     };
-    roughness_.half += meanDifference(own + count()), roughness_.whole += meanDifference(own + count() + besides());
+    roughness_.quarter += (meanBend(1, 1) + meanBend(2, 1) + meanBend(3, 1)) / 3, roughness_.half += meanBend(2, 2);
   }
 }
 

@@ -19,10 +19,11 @@ struct MeasuredError {
   std::size_t probes = 0;
 };
 
-/// How much transmittance differs across the light's way: from a probe's to that of a ray beside it.
+/// How far transmittance bends across the light's way: from a ray's to the mean of two, as far from it on either side.
 struct Roughness {
-  double half = 0, whole = 0;  ///< mean |ΔT| at a distance of half a mean radius, and of a whole one; known to 6 %
-  /// Of ln |ΔT| over ln distance: 1 for smooth clouds, less the fewer particles overlap.
+  /// Mean |ΔT| at a distance of a quarter of a mean radius, and of half a one; known to some 8 %.
+  double quarter = 0, half = 0;
+  /// Of ln |ΔT| over ln distance: 2 for smooth clouds, less where few particles overlap or radii differ.
   double slope() const;
 };
 
@@ -35,8 +36,8 @@ class ErrorProbes {
 
   std::size_t count() const { return index_.size(); }
   /// Rays that lightExactly adds up.
-  std::size_t rays() const { return count() + 2 * besides(); }
-  /// Exact transmittances, and the roughness at `radius` [scene units]. Some 10 µs a ray and thread at 1 M particles.
+  std::size_t rays() const { return count() + 4 * besides(); }
+  /// Exact transmittances, and the roughness at `radius` [scene units]. Some 6 µs a ray and thread at 1 M particles.
   void lightExactly(double radius);
   const Roughness& roughness() const { return roughness_; }
   /// `depths` as opticalDepths gives them for all receivers. After lightExactly.
