@@ -111,8 +111,7 @@ void GridBlocks::setKernels(GridTile& tile, GridArrays& to) {
   const auto number = static_cast<std::uint32_t>(groups_);
   std::size_t found = 0;
   const bool colours = tile.channels > 1;
-  for (std::size_t c = 0; colours && c < tile.channels; ++c)
-    to.peaks[c].assign(p.peak[c].begin(), p.peak[c].begin() + static_cast<std::ptrdiff_t>(count));
+  for (std::size_t c = 0; colours && c < tile.channels; ++c) to.peaks[c].assign(p.peak[c].at(0), p.peak[c].at(count));
   for (std::size_t i = 0; i < count; ++i) {
     layout::GridKernel& kernel = to.kernels[i] = {};
     const int window = windowOf(p, i);

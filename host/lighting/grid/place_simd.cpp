@@ -161,9 +161,9 @@ struct InFrame {
 };
 HWY_INLINE InFrame placeInFrame(const GridTile& tile, GridPoints& points, std::size_t i) {
   const LightFrame& frame = tile.frame;
-  const Vec px = hn::Sub(widen(&points.sourceX[i]), set(frame.origin.x)),
-            py = hn::Sub(widen(&points.sourceY[i]), set(frame.origin.y)),
-            pz = hn::Sub(widen(&points.sourceZ[i]), set(frame.origin.z));
+  const Vec px = hn::Sub(widen(points.sourceX.at(i)), set(frame.origin.x)),
+            py = hn::Sub(widen(points.sourceY.at(i)), set(frame.origin.y)),
+            pz = hn::Sub(widen(points.sourceZ.at(i)), set(frame.origin.z));
   InFrame at{along(px, py, pz, frame.u), along(px, py, pz, frame.v), along(px, py, pz, frame.axis), {}};
   at.depth = at.z;
   Vec perCell = set(1 / tile.shape->resolution.cell);
@@ -194,7 +194,7 @@ void placeKernels(GridTile& tile) {
   const Vec tentBelow = set(weights.tentBelow), narrowing = set(weights.narrowing), support = set(weights.support);
   for (std::size_t i = 0; i < to.points.count; i += lanes()) {
     const InFrame at = placeInFrame(tile, to.points, i);
-    const Vec r = widen(&to.radius[i]);
+    const Vec r = widen(to.radius.at(i));
     Vec cells = hn::Mul(r, perCell), sag = zero, stretch = one, formA = one, formB = zero, formC = one, reach = one;
     Mask shown = hn::Gt(r, zero);
     if (perspective) {

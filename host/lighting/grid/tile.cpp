@@ -16,40 +16,40 @@ void growTo(std::vector<T>& array, std::size_t size) {
   if (array.size() < size + kGridBatch) array.resize(size + size / 2 + kGridBatch);
 }
 
-/// Copies what a tile has from the tree.
+/// Takes what a tile has from the tree.
 void fetchParticles(const Octree& tree, std::span<const std::uint32_t> slots, GridTile& tile) {
   GridParticles& to = tile.particles;
-  to.resize(slots.size(), tile.channels);
-  const std::vector<float>* peaks[] = {&tree.peak, &tree.peakGreen, &tree.peakBlue};
-  for (std::size_t i = 0; i < slots.size(); ++i) {
+  to.resize(slots.size());
+  const std::size_t count = slots.size();
+  const float* peaks[] = {tree.peak.data(), tree.peakGreen.data(), tree.peakBlue.data()};
+  float *x = to.points.sourceX.collect(count), *y = to.points.sourceY.collect(count),
+        *z = to.points.sourceZ.collect(count), *radius = to.radius.collect(count), *peak[3];
+  for (std::size_t c = 0; c < tile.channels; ++c) peak[c] = to.peak[c].collect(count);
+  for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t slot = slots[i];
-    to.points.sourceX[i] = tree.x[slot], to.points.sourceY[i] = tree.y[slot], to.points.sourceZ[i] = tree.z[slot];
-    to.radius[i] = tree.radius[slot];
-    for (std::size_t c = 0; c < tile.channels; ++c) to.peak[c][i] = (*peaks[c])[slot];
+    x[i] = tree.x[slot], y[i] = tree.y[slot], z[i] = tree.z[slot], radius[i] = tree.radius[slot];
+    for (std::size_t c = 0; c < tile.channels; ++c) peak[c][i] = peaks[c][slot];
   }
-}
-
-void copyRange(const std::vector<float>& from, const GridPatch& patch, std::vector<float>& to) {
-  std::copy(from.begin() + patch.begin, from.begin() + patch.end, to.begin());
 }
 
 /// … what a patch has.
 void fetchParticles(const Octree& tree, const GridPatch& patch, GridTile& tile) {
   if (!patch.some.empty()) return fetchParticles(tree, patch.some, tile);
   GridParticles& to = tile.particles;
-  to.resize(patch.count(), tile.channels);
-  copyRange(tree.x, patch, to.points.sourceX), copyRange(tree.y, patch, to.points.sourceY);
-  copyRange(tree.z, patch, to.points.sourceZ), copyRange(tree.radius, patch, to.radius);
+  to.resize(patch.count());
+  to.points.lend(tree, patch.begin);
+  to.radius.lend(tree.radius.data() + patch.begin);
   const std::vector<float>* peaks[] = {&tree.peak, &tree.peakGreen, &tree.peakBlue};
-  for (std::size_t c = 0; c < tile.channels; ++c) copyRange(*peaks[c], patch, to.peak[c]);
+  for (std::size_t c = 0; c < tile.channels; ++c) to.peak[c].lend(peaks[c]->data() + patch.begin);
 }
 
 void fetchReceivers(const Receivers& receivers, std::span<const std::uint32_t> members, GridTile& tile) {
   GridPoints& to = tile.otherPoints;
   to.resize(members.size());
+  float *x = to.sourceX.collect(to.count), *y = to.sourceY.collect(to.count), *z = to.sourceZ.collect(to.count);
   for (std::size_t k = 0; k < members.size(); ++k) {
     const vec3 position = receivers.position(members[k]);
-    to.sourceX[k] = position.x, to.sourceY[k] = position.y, to.sourceZ[k] = position.z;
+    x[k] = position.x, y[k] = position.y, z[k] = position.z;
   }
 }
 
@@ -98,14 +98,18 @@ void cover(const GridPatch& patch, const GridShape& shape, GridTile& tile) {
 
 void GridPoints::resize(std::size_t size) {
   count = size;
-  for (auto* array : {&sourceX, &sourceY, &sourceZ, &x, &y, &depth}) growTo(*array, size);
+  for (auto* array : {&x, &y, &depth}) growTo(*array, size);
   growTo(bin, size);
 }
 
-void GridParticles::resize(std::size_t size, std::size_t channels) {
+void GridPoints::lend(const Octree& tree, std::size_t begin) {
+  static_assert(kSlotPadding >= kGridBatch);
+  sourceX.lend(tree.x.data() + begin), sourceY.lend(tree.y.data() + begin), sourceZ.lend(tree.z.data() + begin);
+}
+
+void GridParticles::resize(std::size_t size) {
   points.resize(size);
-  for (auto* array : {&radius, &half, &a, &b, &c, &mass, &depth, &depthRadius, &curved, &own}) growTo(*array, size);
-  for (std::size_t channel = 0; channel < channels; ++channel) growTo(peak[channel], size);
+  for (auto* array : {&half, &a, &b, &c, &mass, &depth, &depthRadius, &curved, &own}) growTo(*array, size);
   growTo(firstBin, size), growTo(lastBin, size);
 }
 
@@ -147,13 +151,14 @@ void GridTile::placeStanding(const Octree& tree, const GridPatch& patch, const G
   GridPoints& to = otherPoints;
   to.resize(patch.count());
   if (patch.some.empty()) {
-    copyRange(tree.x, patch, to.sourceX), copyRange(tree.y, patch, to.sourceY), copyRange(tree.z, patch, to.sourceZ);
+    to.lend(tree, patch.begin);
   } else {
+    float *x = to.sourceX.collect(to.count), *y = to.sourceY.collect(to.count), *z = to.sourceZ.collect(to.count);
     to.count = 0;
     for (std::size_t i = 0; i < patch.some.size(); ++i) {
       if (patch.stands[i] == 0) continue;
       const vec3 position = tree.position(patch.some[i]);
-      to.sourceX[to.count] = position.x, to.sourceY[to.count] = position.y, to.sourceZ[to.count] = position.z;
+      x[to.count] = position.x, y[to.count] = position.y, z[to.count] = position.z;
       ++to.count;
     }
   }

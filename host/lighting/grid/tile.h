@@ -32,20 +32,41 @@ inline float depthShare(float x) {
   return x < 0 ? 0.5f - half : 0.5f + half;
 }
 
+/// Numbers of particles or receivers: where they stand in a row in the tree, there; else collected.
+class GridSource {
+ public:
+  float operator[](std::size_t i) const { return from_[i]; }
+  const float* at(std::size_t i) const { return from_ + i; }
+  /// Until the next call; as long as the array may be read a vector beyond its end.
+  void lend(const float* from) { from_ = from; }
+  /// Room for `size`, and for one more step.
+  float* collect(std::size_t size) {
+    if (own_.size() < size + kGridBatch) own_.resize(size + size / 2 + kGridBatch);
+    from_ = own_.data();
+    return own_.data();
+  }
+
+ private:
+  const float* from_ = nullptr;
+  std::vector<float> own_;
+};
+
 /// Points in a tile.
 struct GridPoints {
-  std::vector<float> sourceX, sourceY, sourceZ;  ///< as they were found [scene units]
-  std::vector<float> x, y;                       ///< nodes from the tile's corner
-  std::vector<float> depth;                      ///< bins from the tile's base
-  std::vector<std::int32_t> bin;                 ///< that the depth lies in
+  GridSource sourceX, sourceY, sourceZ;  ///< as they were found [scene units]
+  std::vector<float> x, y;               ///< nodes from the tile's corner
+  std::vector<float> depth;              ///< bins from the tile's base
+  std::vector<std::int32_t> bin;         ///< that the depth lies in
   std::size_t count = 0;
   void resize(std::size_t size);
+  /// The sources are the tree's, from a slot on.
+  void lend(const Octree& tree, std::size_t begin);
 };
 
 /// Particles in a tile.
 struct GridParticles {
   GridPoints points;
-  std::vector<float> radius, peak[3];
+  GridSource radius, peak[3];
   /// Half width in cells of what a kernel covers; 0: nothing is put down.
   std::vector<float> half;
   /// q = a·Δx² + b·Δx·Δy + c·Δy² in nodes; `mass` is the integral of F in cells.
@@ -60,7 +81,7 @@ struct GridParticles {
   std::vector<float> own;
   /// Those that go alone (kAlone), ascending.
   std::vector<std::uint32_t> alone;
-  void resize(std::size_t size, std::size_t channels);
+  void resize(std::size_t size);
 };
 
 /// Set up again for each tile; holds on to its memory.
