@@ -3,6 +3,7 @@
 #pragma once
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <exception>
 #include <memory>
 #include <optional>
@@ -13,6 +14,9 @@
 
 namespace mote {
 
+/// What new memory holds, so that a result shows what was read before it was written: floats of it are −1.7e38.
+inline constexpr std::uint8_t kUnwritten = 0xfe;
+
 /// Opened before the first test of the binary, closed after the last.
 class GpuEnvironment : public ::testing::Environment {
  public:
@@ -21,7 +25,7 @@ class GpuEnvironment : public ::testing::Environment {
 
   void SetUp() override {
     try {
-      gpu_.emplace(DeviceOptions{.validate = true});
+      gpu_.emplace(DeviceOptions{.validate = true, .fill = kUnwritten});
     } catch (const std::exception& error) {
       FAIL() << "GPU tests need a Vulkan device and the validation layer: " << error.what();
     }

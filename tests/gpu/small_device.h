@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/vulkan/gpu.h"
+#include "tests/gpu/gpu_fixture.h"
 
 namespace mote {
 
@@ -14,7 +15,8 @@ namespace mote {
 class SmallDevice {
  public:
   explicit SmallDevice(std::uint64_t bytes, bool stageAlways = false)
-      : gpu_(DeviceOptions{.validate = true, .stageAlways = stageAlways, .memory = {.bytes = bytes}}) {}
+      : gpu_(DeviceOptions{
+            .validate = true, .stageAlways = stageAlways, .memory = {.bytes = bytes}, .fill = kUnwritten}) {}
   ~SmallDevice() {
     const MemoryBudget& budget = device().budget();
     EXPECT_LE(budget.peak(), budget.limit());
