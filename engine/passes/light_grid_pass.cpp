@@ -1,7 +1,5 @@
 #include "engine/passes/light_grid_pass.h"
 
-#include <tbb/enumerable_thread_specific.h>
-
 #include <algorithm>
 
 #include "host/core/parallel.h"
@@ -19,13 +17,6 @@ constexpr std::uint32_t kMostSteps = 60000;
 
 /// What the tiles of one call share, and where their depths go.
 struct LightGridPass::Call {
-  /// Of each thread, and gone with the call: hundreds of bytes for each particle of a tile.
-  struct Workspace {
-    GridTile tile;
-    GridBlocks blocks;
-    std::vector<float> read;
-  };
-
   const Octree& tree;
   const Receivers& receivers;
   const LightingOptions& options;
@@ -34,29 +25,33 @@ struct LightGridPass::Call {
   float slack;  // columnRules
   const RaysDone& done;
   std::vector<float> depths;  // [channel][receiver]
-  std::vector<Work> works{};  // of tiles that are set up together; their memory serves the next ones
-  tbb::enumerable_thread_specific<Workspace> workspaces{};
 
   std::size_t items(const GridPlan::Tile& tile) const {
     return plan.receivers(tile).size() + plan.particles(tile).size();
   }
 };
 
-std::span<const LightGridPass::Work> LightGridPass::setUpTiles(Call& call, std::size_t begin) const {
+std::span<const LightGridPass::Work> LightGridPass::setUpTiles(const Call& call, std::size_t begin) {
   const std::vector<GridPlan::Tile>& tiles = call.plan.tiles;
   std::size_t end = begin, items = 0;
   while (end < tiles.size() && (end == begin || items + call.items(tiles[end]) <= kMostItems))
     items += call.items(tiles[end++]);
-  if (call.works.size() < end - begin) call.works.resize(end - begin);
+  if (works_.size() < end - begin) works_.resize(end - begin);
   parallelBlocks(end - begin, 1, [&](std::size_t k, std::size_t) {
-    auto& [tile, blocks, read] = call.workspaces.local();
-    Work& work = call.works[k];
+    auto& [tile, blocks, read] = workspaces_.local();
+    Work& work = works_[k];
     work.planned = &tiles[begin + k];
     tile.setUp(call.tree, call.receivers, call.plan, *work.planned, call.shape, call.options.falloff);
     blocks.setUp(tile, call.receivers, call.plan.receivers(*work.planned), call.plan.particles(*work.planned),
                  device_.leastSubgroupSize(), kMostSteps, work.arrays);
   });
-  return std::span(call.works).first(end - begin);
+  return std::span(works_).first(end - begin);
+}
+
+void LightGridPass::release() {
+  grid_.release();
+  works_ = {};
+  workspaces_.clear();
 }
 
 void LightGridPass::keep(Call& call, std::span<const Work> works, std::span<const float> found) {
@@ -64,7 +59,7 @@ void LightGridPass::keep(Call& call, std::span<const Work> works, std::span<cons
   std::vector<std::size_t> start(works.size(), 0);
   for (std::size_t w = 1; w < works.size(); ++w) start[w] = start[w - 1] + works[w - 1].arrays.receivers.size();
   parallelBlocks(works.size(), 1, [&](std::size_t w, std::size_t) {
-    std::vector<float>& read = call.workspaces.local().read;
+    std::vector<float>& read = workspaces_.local().read;
     const GridPlan::Tile& planned = *works[w].planned;
     const std::span<const std::uint32_t> members = call.plan.receivers(planned);
     const std::size_t count = members.size();

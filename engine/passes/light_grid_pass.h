@@ -11,6 +11,8 @@
 // thousands of them at once; stores are side by side; there is no atomic, shared memory or barrier of a workgroup, so
 // sums are always in the same order. (So it should; it was measured on lavapipe alone.)
 #pragma once
+#include <tbb/enumerable_thread_specific.h>
+
 #include <vector>
 
 #include "engine/passes/grid_device.h"
@@ -37,8 +39,8 @@ class LightGridPass {
 
   /// Device seconds of all opticalDepths calls so far, from timestamps.
   double deviceSeconds() const { return grid_.seconds(); }
-  /// Gives back to the device's budget what the last opticalDepths needed; the next takes it again.
-  void release() { grid_.release(); }
+  /// Gives back what the last opticalDepths needed, to the device's budget and the host; the next takes it again.
+  void release();
 
  private:
   /// A tile that is set up.
@@ -46,15 +48,23 @@ class LightGridPass {
     const GridPlan::Tile* planned = nullptr;
     GridArrays arrays;
   };
+  /// Of each thread: hundreds of bytes for each particle of a tile.
+  struct Workspace {
+    GridTile tile;
+    GridBlocks blocks;
+    std::vector<float> read;
+  };
   struct Call;
 
   /// Sets up tiles of the plan from number `begin` on: as many as keep all threads busy.
-  std::span<const Work> setUpTiles(Call& call, std::size_t begin) const;
+  std::span<const Work> setUpTiles(const Call& call, std::size_t begin);
   /// Depths that `run` found to the receivers they belong to, with what particles near the light add.
-  static void keep(Call& call, std::span<const Work> works, std::span<const float> found);
+  void keep(Call& call, std::span<const Work> works, std::span<const float> found);
 
   const Device& device_;
   GridDevice grid_;
+  std::vector<Work> works_;  // of tiles that are set up together; their memory serves the next ones
+  tbb::enumerable_thread_specific<Workspace> workspaces_;
 };
 
 }  // namespace mote

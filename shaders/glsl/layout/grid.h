@@ -1,35 +1,33 @@
 // The light grid on the device (engine/passes/light_grid_pass.h): what the grid_*.comp read and write.
 //
-// Nodes of a tile go in blocks of 4 × 4, bins of depth in groups of 4. A stored block has the optical depths at both
-// edges of each of a group's bins for 16 nodes, [bin][row][column]; those of a tile's 4 × 4 nodes that any particle
-// touches stand one behind the other, by depth. Block 0 is all zeros: what lies before everything. Shaders load two
-// words at once.
+// Nodes of a tile go in blocks of 4 × 4, bins of depth in groups of 4. A stored block has the optical depths at both edges
+// of each of a group's bins for 16 nodes, [bin][row][column]; those of a tile's 4 × 4 nodes that any particle touches
+// stand one behind the other, by depth. Block 0 is all zeros: what lies before everything. Shaders load two words at once.
 #ifndef MOTE_LAYOUT_GRID_H
 #define MOTE_LAYOUT_GRID_H
 #include "types.h"
 
 MOTE_LAYOUT_BEGIN
-MOTE_CONST uint kBlockEdge = 4u;  // nodes along a block's edge
+MOTE_CONST uint kBlockEdge = 4u;   // nodes along a block's edge
 MOTE_CONST uint kBlockNodes = 16u;
 MOTE_CONST uint kBlockBins = 4u;
 MOTE_CONST uint kBlockPairs = 64u;
-MOTE_CONST uint kTileBlocks = 9u;  // along the edge of a tile of 33 nodes
+MOTE_CONST uint kTileBlocks = 9u;    // along the edge of a tile of 33 nodes
 
 // Weights of the smooth falloff end here, sooner than F(q) (KernelWeights in host/lighting/grid/plan.h).
 MOTE_CONST float kGridSmoothSupport = 0.75f;
 
 // A particle's kernel: weights F(q) with q = a·Δx² + b·Δx·Δy + c·Δy² in nodes. Where c is 0 it is a tent over a cell.
-// Where it is −1 the light is near, and q = a · (Δx² + Δy² + (Δx·v − Δy·u)²) / n with (u, v) of the node, n = 1 + u² +
-// v².
+// Where it is −1 the light is near, and q = a · (Δx² + Δy² + (Δx·v − Δy·u)²) / n with (u, v) of the node, n = 1 + u² + v².
 struct GridKernel {
-  float x;  // [nodes from the tile's corner]
+  float x;              // [nodes from the tile's corner]
   float y;
   float depth;          // of the middle [bins from the tile's base]
   float inverseRadius;  // [1 / bins]
   float a;
   float b;
   float c;
-  float scale;  // of the weights: optical depth; with three channels for a peak of 1
+  float scale;          // of the weights: optical depth; with three channels for a peak of 1
 };
 MOTE_BUFFER(GridKernelBuffer, GridKernel)
 MOTE_ASSERT_OFFSET(GridKernel, x, 0);
@@ -58,11 +56,11 @@ MOTE_ASSERT_SIZE(GridBlock, 16);
 
 // Blocks through the depth over the same 4 × 4 nodes, or a piece of them.
 struct GridStrand {
-  uint first;    // blocks
-  uint end;      // > first
-  float column;  // of the first node [nodes from the tile's corner]
+  uint first;   // blocks
+  uint end;     // > first
+  float column; // of the first node [nodes from the tile's corner]
   float row;
-  float u;  // where that node stands on the plane one unit from a point light
+  float u;      // where that node stands on the plane one unit from a point light
   float v;
 };
 MOTE_BUFFER(GridStrandBuffer, GridStrand)
@@ -84,8 +82,7 @@ MOTE_ASSERT_OFFSET(GridPair, before, 0);
 MOTE_ASSERT_OFFSET(GridPair, after, 4);
 MOTE_ASSERT_SIZE(GridPair, 8);
 
-// Where a group's depths over a tile's 4 × 4 nodes are: 2 · stored block, + 1 where it is of the group, else of one
-// before.
+// Where a group's depths over a tile's 4 × 4 nodes are: 2 · stored block, + 1 where it is of the group, else of one before.
 struct GridEntryPair {
   uint here;
   uint right;  // of the next 4 columns
@@ -96,7 +93,7 @@ MOTE_ASSERT_OFFSET(GridEntryPair, right, 4);
 MOTE_ASSERT_SIZE(GridEntryPair, 8);
 
 struct GridReceiver {
-  float x;  // [nodes from the tile's corner]
+  float x;     // [nodes from the tile's corner]
   float y;
   float into;  // its bin [bins]
   uint place;  // 4 · where its group's part of the table begins + which of its group's the bin is
@@ -111,16 +108,16 @@ MOTE_ASSERT_SIZE(GridReceiver, 16);
 // One dispatch of grid_fill.comp or grid_read.comp, of one channel.
 struct GridParams {
   MOTE_ADDRESS(GridKernelBuffer) kernels;
-  MOTE_ADDRESS(FloatBuffer) peaks;   // of the kernels: optical depth through the centre; three channels alone
-  MOTE_ADDRESS(UintBuffer) entries;  // numbers of kernels, block after block
+  MOTE_ADDRESS(FloatBuffer) peaks;       // of the kernels: optical depth through the centre; three channels alone
+  MOTE_ADDRESS(UintBuffer) entries;      // numbers of kernels, block after block
   MOTE_ADDRESS(GridBlockBuffer) blocks;
   MOTE_ADDRESS(GridStrandBuffer) strands;
-  MOTE_ADDRESS(GridPairBuffer) stored;      // kBlockPairs a block
+  MOTE_ADDRESS(GridPairBuffer) stored;   // kBlockPairs a block
   MOTE_ADDRESS(GridEntryPairBuffer) table;  // tile by tile, [group][block of the tile]
   MOTE_ADDRESS(GridReceiverBuffer) receivers;
-  MOTE_ADDRESS(FloatBuffer) depths;  // in: what each receiver would find of its own particle; out: what it finds
-  uint count;                        // of strands or receivers
-  float cell;                        // [on the plane one unit from a point light]
+  MOTE_ADDRESS(FloatBuffer) depths;      // in: what each receiver would find of its own particle; out: what it finds
+  uint count;                            // of strands or receivers
+  float cell;                            // [on the plane one unit from a point light]
 };
 MOTE_ASSERT_OFFSET(GridParams, kernels, 0);
 MOTE_ASSERT_OFFSET(GridParams, peaks, 8);

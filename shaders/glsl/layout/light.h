@@ -32,15 +32,15 @@ MOTE_ASSERT_OFFSET(Light, cosInner, 52);
 MOTE_ASSERT_OFFSET(Light, cosOuter, 56);
 MOTE_ASSERT_SIZE(Light, 60);
 
-// One column of rays (host/lighting/exact/column.h) as light_gather.comp takes it. Particles are placed from `middle`,
-// a point on the axis amid the tree, so that what is computed is short; …Low is what rounding to float left.
+// One column of rays (host/lighting/exact/column.h) as light_gather.comp takes it. Particles are placed from `middle`, a
+// point on the axis amid the tree, so that what is computed is short; …Low is what rounding to float left.
 struct LightColumn {
-  vec3 planeOrigin;  // what the planes are relative to [scene units]
-  float depthBase;   // depths are the distances from the light (directional: along the travel) less this
-  vec3 middle;       // [scene units]
+  vec3 planeOrigin;       // what the planes are relative to [scene units]
+  float depthBase;        // depths are the distances from the light (directional: along the travel) less this
+  vec3 middle;            // [scene units]
   float depthBaseLow;
-  vec3 u;         // the frame: unit, orthogonal; the axis is the way of the light
-  float middleU;  // where `middle` lies in it
+  vec3 u;                 // the frame: unit, orthogonal; the axis is the way of the light
+  float middleU;          // where `middle` lies in it
   vec3 v;
   float middleV;
   vec3 axis;
@@ -51,11 +51,11 @@ struct LightColumn {
   float middleVLow;
   vec3 axisLow;
   float middleZLow;
-  float boxU;  // the beams' rectangle, in steps of a 255th: its corner, …
+  float boxU;             // the beams' rectangle, in steps of a 255th: its corner, …
   float boxV;
-  float boxScaleU;  // … steps a unit …
+  float boxScaleU;        // … steps a unit …
   float boxScaleV;
-  float boxExtent;  // … and the factor on a particle's extents with which it covers all that it may touch
+  float boxExtent;        // … and the factor on a particle's extents with which it covers all that it may touch
 };
 MOTE_BUFFER(LightColumnBuffer, LightColumn)
 MOTE_ASSERT_OFFSET(LightColumn, planeOrigin, 0);
@@ -83,12 +83,12 @@ MOTE_ASSERT_SIZE(LightColumn, 148);
 
 // How far the walk for a column has come, and what it has found since light_sum.comp last added up. All zero: nothing.
 struct LightWalk {
-  uint node;          // the next one
-  uint slot;          // the leaf at hand: the next particle …
-  uint end;           // … and the one behind its last
-  uint count;         // particles found
-  uint nearCount;     // … and those near the light
-  float lowestReach;  // bin of a reach x: (x − lowestReach) · binScale
+  uint node;              // the next one
+  uint slot;              // the leaf at hand: the next particle …
+  uint end;               // … and the one behind its last
+  uint count;             // particles found
+  uint nearCount;         // … and those near the light
+  float lowestReach;      // bin of a reach x: (x − lowestReach) · binScale
   float binScale;
   float greatestRadius;
 };
@@ -103,16 +103,16 @@ MOTE_ASSERT_OFFSET(LightWalk, binScale, 24);
 MOTE_ASSERT_OFFSET(LightWalk, greatestRadius, 28);
 MOTE_ASSERT_SIZE(LightWalk, 32);
 
-// One beam (host/lighting/exact/beam.h) as light_sum.comp takes it.
+// One beam (host/lighting/beam.h) as light_sum.comp takes it.
 struct LightBeam {
-  uint firstRay;  // of the dispatch
+  uint firstRay;          // of the dispatch
   uint rayCount;
-  uint column;   // of the dispatch
-  uint box;      // its rectangle in the column's steps: low u, low v, high u, high v, a byte each
-  vec3 turnU;    // rows: from the column's frame (u, v, 1) into the beam's
-  float margin;  // rounding of depths [scene units]
+  uint column;            // of the dispatch
+  uint box;               // its rectangle in the column's steps: low u, low v, high u, high v, a byte each
+  vec3 turnU;             // rows: from the column's frame (u, v, 1) into the beam's
+  float margin;           // rounding of depths [scene units]
   vec3 turnV;
-  float depthBase;  // the column's
+  float depthBase;        // the column's
   vec3 turnW;
 };
 MOTE_BUFFER(LightBeamBuffer, LightBeam)
@@ -129,10 +129,10 @@ MOTE_ASSERT_SIZE(LightBeam, 60);
 
 // One ray of a beam; a beam's rays stand by ascending depth.
 struct LightRay {
-  float u;  // where it crosses the plane one unit from a point light, or that of a directional one
+  float u;                // where it crosses the plane one unit from a point light, or that of a directional one
   float v;
-  float depth;  // of its start
-  uint self;    // slot that it leaves out, or none
+  float depth;            // of its start
+  uint self;              // slot that it leaves out, or none
   float uLow;
   float vLow;
   float depthLow;
@@ -153,18 +153,17 @@ MOTE_ASSERT_SIZE(LightRay, 28);
 MOTE_CONST uint kFoundLists = 3u;
 MOTE_CONST uint kOrderLists = 3u;
 MOTE_CONST uint kLightBins = 128u;
-// Of a beam, as vec4: u, v, 1/r², peak · as the column's third. As uint: place in the column's order · place in its
-// lists.
+// Of a beam, as vec4: u, v, 1/r², peak · as the column's third. As uint: place in the column's order · place in its lists.
 MOTE_CONST uint kChosenLists = 2u;
 
 // One dispatch of light_gather.comp or light_sum.comp: columns [0, columnCount) and beams [0, beamCount).
 struct LightParams {
-  MOTE_ADDRESS(NodeBuffer) nodes;      // nodeCount nodes and the sentinel
-  MOTE_ADDRESS(Vec4Buffer) particles;  // slot order: x, y, z, support radius [scene units]
-  MOTE_ADDRESS(FloatBuffer) peaks;     // slot order, [channel][slot]: optical depth through the centre
+  MOTE_ADDRESS(NodeBuffer) nodes;           // nodeCount nodes and the sentinel
+  MOTE_ADDRESS(Vec4Buffer) particles;       // slot order: x, y, z, support radius [scene units]
+  MOTE_ADDRESS(FloatBuffer) peaks;          // slot order, [channel][slot]: optical depth through the centre
   MOTE_ADDRESS(LightColumnBuffer) columns;
-  MOTE_ADDRESS(Vec4Buffer) planes;      // eight a column: outward unit normal, offset
-  MOTE_ADDRESS(LightWalkBuffer) walks;  // one a column
+  MOTE_ADDRESS(Vec4Buffer) planes;          // eight a column: outward unit normal, offset
+  MOTE_ADDRESS(LightWalkBuffer) walks;      // one a column
   MOTE_ADDRESS(LightBeamBuffer) beams;
   MOTE_ADDRESS(LightRayBuffer) rays;
   MOTE_ADDRESS(FloatBuffer) opticalDepths;  // in and out, [channel][ray]: Σ τ before shadowDensity
@@ -176,7 +175,7 @@ struct LightParams {
   uint columnCount;
   uint beamCount;
   uint rayCount;
-  float opticalDepthLimit;  // rays may stop beyond it: −ln(cutoff) / shadowDensity; +∞ for cutoff 0
+  float opticalDepthLimit;                  // rays may stop beyond it: −ln(cutoff) / shadowDensity; +∞ for cutoff 0
   uint slotCount;
 };
 MOTE_ASSERT_OFFSET(LightParams, nodes, 0);
