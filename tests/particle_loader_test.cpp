@@ -10,9 +10,9 @@
 #include "host/core/log.h"
 #include "host/core/parallel.h"
 #include "host/core/random.h"
+#include "host/particles/formats/prt_writer.h"
 #include "host/particles/generate.h"
 #include "host/particles/particle_loader.h"
-#include "host/particles/prt_writer.h"
 #include "host/particles/spacing.h"
 #include "tests/support/temp_folder.h"
 
@@ -89,6 +89,27 @@ TEST(ParticleLoader, FillsWhatAFileLacks) {
   EXPECT_TRUE(set.id.empty());
 }
 
+TEST(ParticleLoader, FindsChannelsUnderTheNamesOfOtherPrograms) {
+  const TempFolder folder;
+  const Sample sample;
+  const PrtColumn columns[] = {PrtColumn::of("Position", sample.position), PrtColumn::of("mass", sample.density),
+                               PrtColumn::of("pscale", sample.radius)};
+  writePrt(folder.file("a.prt"), columns);
+  std::string bytes = test::readBytes(folder.file("a.prt"));
+  bytes.replace(bytes.find("Position"), 8, std::string("P\0\0\0\0\0\0\0", 8));
+  test::writeBytes(folder.file("a.prt"), bytes);
+  const ParticleSet set = loadParticles({fileSource(folder.file("a.prt"))}, 1);
+  EXPECT_EQ(set.position, sample.position);
+  EXPECT_EQ(set.density, sample.density);
+  EXPECT_EQ(set.radius, sample.radius);
+
+  // Our own name comes first.
+  const PrtColumn both[] = {PrtColumn::of("Position", sample.position), PrtColumn::of("mass", sample.radius),
+                            PrtColumn::of("Density", sample.density)};
+  writePrt(folder.file("b.prt"), both);
+  EXPECT_EQ(loadParticles({fileSource(folder.file("b.prt"))}, 1).density, sample.density);
+}
+
 TEST(ParticleLoader, MapsChannelsByTheNamesOfTheScene) {
   const TempFolder folder;
   const Sample sample;
@@ -97,25 +118,25 @@ TEST(ParticleLoader, MapsChannelsByTheNamesOfTheScene) {
   writePrt(folder.file("a.prt"), columns);
   // Our writer insists on a Position; other programs' files may call it otherwise.
   std::string bytes = test::readBytes(folder.file("a.prt"));
-  bytes.replace(bytes.find("Position"), 8, std::string("P\0\0\0\0\0\0\0", 8));
+  bytes.replace(bytes.find("Position"), 8, std::string("Q\0\0\0\0\0\0\0", 8));
   test::writeBytes(folder.file("a.prt"), bytes);
   ParticleSource source = fileSource(folder.file("a.prt"));
   expectRefused([&] { loadParticles({source}, 1); },
-                {"'Position'", "it has P (3 × float32), rho (float32), pscale (float32)"});
-  source.channels = {{"Position", "P"}, {"Density", "rho"}, {"Radius", "pscale"}};
+                {"'Position'", "it has Q (3 × float32), rho (float32), pscale (float32)"});
+  source.channels = {{"Position", "Q"}, {"Density", "rho"}, {"Radius", "pscale"}};
   ParticleSet set = loadParticles({source}, 1);
   EXPECT_EQ(set.density, sample.density);
   EXPECT_EQ(set.radius, sample.radius);
-  source.channels = {{"Position", "P"}};
+  source.channels = {{"Position", "Q"}};
   source.radius = {RadiusRule::Kind::Channel, 0, "pscale", 2};
   set = loadParticles({source}, 1);
   EXPECT_EQ(set.radius, (std::vector<float>{0.2f, 0.4f, 0.6f}));
 
   source.radius.channel = "width";
-  expectRefused([&] { loadParticles({source}, 1); }, {"/particles/0", "radius/channel", "'width'", "it has P"});
+  expectRefused([&] { loadParticles({source}, 1); }, {"/particles/0", "radius/channel", "'width'", "it has Q"});
   source.radius = {};
   source.channels["Density"] = "density";
-  expectRefused([&] { loadParticles({source}, 1); }, {"/particles/0", "channels/Density", "'density'", "it has P"});
+  expectRefused([&] { loadParticles({source}, 1); }, {"/particles/0", "channels/Density", "'density'", "it has Q"});
   source.channels = {{"Densty", "rho"}};
   expectRefused([&] { loadParticles({source}, 1); }, {"'Densty'"});
 }
@@ -316,7 +337,7 @@ TEST(ParticleLoader, RefusesDoublePositionsBeyondFloat) {
   const TempFolder folder;
   std::vector<double> doubles{1, 2, 3, 4, 1e300, 6};
   std::vector<vec3> dummy(2);
-  const PrtColumn columns[] = {PrtColumn::raw("P64", PrtType::F64, 3, std::as_bytes(std::span(doubles))),
+  const PrtColumn columns[] = {PrtColumn::raw("P64", NumberType::F64, 3, std::as_bytes(std::span(doubles))),
                                PrtColumn::of("Position", dummy)};
   writePrt(folder.file("a.prt"), columns);
   ParticleSource source = fileSource(folder.file("a.prt"));

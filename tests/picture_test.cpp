@@ -9,8 +9,8 @@
 #include <set>
 
 #include "engine/renderer.h"
+#include "host/particles/formats/prt_writer.h"
 #include "host/particles/generate.h"
-#include "host/particles/prt_writer.h"
 #include "host/scene/scene_reader.h"
 #include "host/splat/splat.h"
 #include "tests/support/temp_folder.h"

@@ -18,8 +18,8 @@
 #include "host/core/error.h"
 #include "host/core/log.h"
 #include "host/core/parallel.h"
-#include "host/particles/prt_reader.h"
-#include "host/particles/prt_writer.h"
+#include "host/particles/formats/prt_reader.h"
+#include "host/particles/formats/prt_writer.h"
 #include "tests/support/temp_folder.h"
 
 namespace mote {
@@ -99,7 +99,7 @@ std::vector<vec3> positionsOf(const std::string& bytes) {
   writeBytes(folder.file("a.prt"), bytes);
   const PrtReader reader(folder.file("a.prt"));
   std::vector<vec3> positions;
-  const PrtRequest request{"Position", &positions};
+  const ChannelRequest request{"Position", &positions};
   reader.read({&request, 1});
   return positions;
 }
@@ -182,7 +182,7 @@ TEST(PrtReader, ReadsTheMakersOwnFileWithItsMetadata) {
   EXPECT_EQ(reader.count(), 312u);
   EXPECT_EQ(reader.header().minorVersion, 1);
   EXPECT_EQ(reader.header().particleBytes, 40u);
-  EXPECT_EQ(reader.header().describeChannels(),
+  EXPECT_EQ(describeChannels(reader.channels()),
             "Position (3 × float32), Color (3 × float32), Velocity (3 × float32), Density (float32)");
   ASSERT_EQ(reader.header().metadata.size(), 5u);
   ASSERT_NE(reader.header().meta("", "LengthUnitInMeters"), nullptr);
@@ -191,7 +191,7 @@ TEST(PrtReader, ReadsTheMakersOwnFileWithItsMetadata) {
   EXPECT_EQ(reader.header().meta("Velocity", "Interpretation")->bytes, raw(std::int32_t{2}));
 
   std::vector<vec3> positions;
-  const PrtRequest request{"Position", &positions};
+  const ChannelRequest request{"Position", &positions};
   reader.read({&request, 1});
   ASSERT_EQ(positions.size(), 312u);
   Bounds box;
@@ -204,7 +204,7 @@ TEST(PrtReader, ReadsTheSmokeOf350000Particles) {
   const PrtReader reader(sharedFile("smoke1/smoke1_350k_power05.prt"));
   std::vector<vec3> positions;
   std::vector<float> density;
-  const PrtRequest requests[] = {{"Density", &density}, {"Position", &positions}};
+  const ChannelRequest requests[] = {{"Density", &density}, {"Position", &positions}};
   reader.read(requests);
   ASSERT_EQ(positions.size(), 350000u);
   ASSERT_EQ(density.size(), 350000u);
@@ -256,7 +256,7 @@ TEST(PrtReader, ReservesNoMoreThanTheFilesBytesGive) {
   const TempFolder folder;
   writeBytes(folder.file("a.prt"), file.bytes());
   std::vector<vec3> positions;
-  const PrtRequest request{"Position", &positions};
+  const ChannelRequest request{"Position", &positions};
   const PrtReader reader(folder.file("a.prt"));
   expectRefused([&] { reader.read({&request, 1}); }, {"particle 3 of"});
   EXPECT_LT(positions.capacity(), 100u);
@@ -407,7 +407,7 @@ TEST(PrtReader, RefusesChannelsThatTheFileLacksOrThatDoNotFit) {
   writeBytes(folder.file("a.prt"), PrtFile().bytes());
   const PrtReader reader(folder.file("a.prt"));
   std::vector<float> values;
-  PrtRequest request{"density", &values};
+  ChannelRequest request{"density", &values};
   expectRefused([&] { reader.read({&request, 1}); }, {"'density'", "it has Position (3 × float32), Density (float32)"});
   request.channel = "Position";
   expectRefused([&] { reader.read({&request, 1}); }, {"arity 1", "arity 3"});
@@ -420,7 +420,7 @@ T sample(int i) {
 
 /// Writes `T` numbers of several arities as raw columns, reads them raw and converted.
 template <class T>
-void expectRoundTrip(PrtType type) {
+void expectRoundTrip(NumberType type) {
   constexpr int kCount = 301;
   const TempFolder folder;
   std::vector<vec3> positions(kCount, vec3(1));
@@ -436,7 +436,7 @@ void expectRoundTrip(PrtType type) {
     EXPECT_EQ(reader.header().channel("Value")->arity, arity);
 
     std::vector<std::byte> back;
-    std::vector<PrtRequest> requests{{"Value", &back}};
+    std::vector<ChannelRequest> requests{{"Value", &back}};
     std::vector<vec3> vectors;
     std::vector<float> floats;
     std::vector<std::uint64_t> integers;
@@ -444,7 +444,7 @@ void expectRoundTrip(PrtType type) {
     if (arity == 1) requests.push_back({"Value", &floats}), requests.push_back({"Value", &integers});
     reader.read(requests);
     ASSERT_EQ(back.size(), bytes.size());
-    EXPECT_EQ(std::memcmp(back.data(), bytes.data(), bytes.size()), 0) << prtTypeName(type) << " × " << arity;
+    EXPECT_EQ(std::memcmp(back.data(), bytes.data(), bytes.size()), 0) << numberName(type) << " × " << arity;
     for (std::size_t i = 0; i < vectors.size(); ++i)
       for (std::uint32_t c = 0; c < 3; ++c)  // whole numbers below 100 are exact in every type
         ASSERT_EQ(vectors[i][static_cast<int>(c)], static_cast<float>(values[i * arity + (arity == 1 ? 0 : c)]));
@@ -458,17 +458,17 @@ void expectRoundTrip(PrtType type) {
 }
 
 TEST(PrtRoundTrip, EveryTypeAndArity) {
-  expectRoundTrip<std::int8_t>(PrtType::I8);
-  expectRoundTrip<std::uint8_t>(PrtType::U8);
-  expectRoundTrip<std::int16_t>(PrtType::I16);
-  expectRoundTrip<std::uint16_t>(PrtType::U16);
-  expectRoundTrip<std::int32_t>(PrtType::I32);
-  expectRoundTrip<std::uint32_t>(PrtType::U32);
-  expectRoundTrip<std::int64_t>(PrtType::I64);
-  expectRoundTrip<std::uint64_t>(PrtType::U64);
-  expectRoundTrip<Imath::half>(PrtType::F16);
-  expectRoundTrip<float>(PrtType::F32);
-  expectRoundTrip<double>(PrtType::F64);
+  expectRoundTrip<std::int8_t>(NumberType::I8);
+  expectRoundTrip<std::uint8_t>(NumberType::U8);
+  expectRoundTrip<std::int16_t>(NumberType::I16);
+  expectRoundTrip<std::uint16_t>(NumberType::U16);
+  expectRoundTrip<std::int32_t>(NumberType::I32);
+  expectRoundTrip<std::uint32_t>(NumberType::U32);
+  expectRoundTrip<std::int64_t>(NumberType::I64);
+  expectRoundTrip<std::uint64_t>(NumberType::U64);
+  expectRoundTrip<Imath::half>(NumberType::F16);
+  expectRoundTrip<float>(NumberType::F32);
+  expectRoundTrip<double>(NumberType::F64);
 }
 
 TEST(PrtRoundTrip, KeepsMetadataThroughWriterReaderWriter) {
@@ -476,17 +476,17 @@ TEST(PrtRoundTrip, KeepsMetadataThroughWriterReaderWriter) {
   const std::vector<vec3> positions{{1, 2, 3}, {-1, 5, 2}};
   const std::vector<float> density{1, 2};
   const PrtColumn columns[] = {PrtColumn::of("Position", positions), PrtColumn::of("Density", density)};
-  const std::vector<PrtMetadata> metadata{PrtMetadata::float64("", "LengthUnitInMeters", 0.01),
-                                          PrtMetadata::int32("", "CoordSys", 1),
-                                          PrtMetadata::text("", "Author", "Jürgen"),
-                                          PrtMetadata::int32("Position", "Interpretation", 1),
-                                          PrtMetadata::float32s("Density", "Extents", {1, 2}),
-                                          PrtMetadata::text("Gone", "Note", "x")};
+  const std::vector<Metadata> metadata{Metadata::float64("", "LengthUnitInMeters", 0.01),
+                                       Metadata::int32("", "CoordSys", 1),
+                                       Metadata::text("", "Author", "Jürgen"),
+                                       Metadata::int32("Position", "Interpretation", 1),
+                                       Metadata::float32s("Density", "Extents", {1, 2}),
+                                       Metadata::text("Gone", "Note", "x")};
   writePrt(folder.file("a.prt"), columns, metadata);
   const PrtReader first(folder.file("a.prt"));
   EXPECT_EQ(first.header().metadata.size(), metadata.size());  // BoundBox came, Gone went
   for (std::size_t i = 0; i + 1 < metadata.size(); ++i) {
-    const PrtMetadata* found = first.header().meta(metadata[i].channel, metadata[i].name);
+    const Metadata* found = first.header().meta(metadata[i].channel, metadata[i].name);
     ASSERT_NE(found, nullptr) << metadata[i].name;
     EXPECT_EQ(found->type, metadata[i].type);
     EXPECT_EQ(found->bytes, metadata[i].bytes);
@@ -558,7 +558,7 @@ TEST(PrtWriter, WritesEveryChannelThatASetHas) {
   const TempFolder folder;
   writePrt(folder.file("a.prt"), columnsOf(set));
   std::vector<vec3> absorption, emission;
-  const PrtRequest requests[] = {{"Absorption", &absorption}, {"Emission", &emission}};
+  const ChannelRequest requests[] = {{"Absorption", &absorption}, {"Emission", &emission}};
   PrtReader(folder.file("a.prt")).read(requests);
   EXPECT_EQ(absorption, set.absorption);
   EXPECT_EQ(emission, set.emission);

@@ -12,7 +12,7 @@
 #include "host/core/log.h"
 #include "host/core/output_file.h"
 #include "host/core/timer.h"
-#include "host/particles/prt_writer.h"
+#include "host/particles/formats/prt_writer.h"
 #include "host/scene/frame_path.h"
 #include "tools/command.h"
 
@@ -68,18 +68,18 @@ std::string uint32Bytes(std::initializer_list<std::uint32_t> values) {
 }
 
 /// PRT's own standard values, and what made the file: nothing that differs between two runs.
-std::vector<PrtMetadata> metadataOf(const GenerateOptions& options, std::uint64_t count, int frame) {
+std::vector<Metadata> metadataOf(const GenerateOptions& options, std::uint64_t count, int frame) {
   constexpr std::int32_t kRightHandedYUp = 1, kPoint = 1, kVector = 2, kScalar = 6;
-  return {PrtMetadata::int32("", "CoordSys", kRightHandedYUp),
-          {"", "FrameRate", static_cast<std::int32_t>(PrtType::U32),
+  return {Metadata::int32("", "CoordSys", kRightHandedYUp),
+          {"", "FrameRate", static_cast<std::int32_t>(NumberType::U32),
            uint32Bytes({static_cast<std::uint32_t>(kGeneratorFps), 1})},
-          PrtMetadata::text("", "Generator",
-                            fmt::format("mote {} generate {} --count {} --seed {} --frames {}", MOTE_VERSION,
-                                        options.kind, count, options.seed, frame)),
-          PrtMetadata::text("", "GeneratorSeed", fmt::format("{}", options.seed)),
-          PrtMetadata::int32("Position", "Interpretation", kPoint),
-          PrtMetadata::int32("Velocity", "Interpretation", kVector),
-          PrtMetadata::int32("Radius", "Interpretation", kScalar)};
+          Metadata::text("", "Generator",
+                         fmt::format("mote {} generate {} --count {} --seed {} --frames {}", MOTE_VERSION, options.kind,
+                                     count, options.seed, frame)),
+          Metadata::text("", "GeneratorSeed", fmt::format("{}", options.seed)),
+          Metadata::int32("Position", "Interpretation", kPoint),
+          Metadata::int32("Velocity", "Interpretation", kVector),
+          Metadata::int32("Radius", "Interpretation", kScalar)};
 }
 
 void generate(const GenerateOptions& options) {

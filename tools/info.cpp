@@ -11,7 +11,7 @@
 
 #include "host/core/error.h"
 #include "host/image/exr.h"
-#include "host/particles/prt_format.h"
+#include "host/particles/formats/particle_file.h"
 #include "host/scene/missing_file.h"
 #include "tools/command.h"
 
@@ -33,14 +33,15 @@ Kind kindOf(const std::string& path) {
   file.read(start, sizeof start);
   if (!file.is_open()) throw InputError(path, "", "a file that can be read", "no permission to");
   constexpr char kExrMagic[] = {'\x76', '\x2f', '\x31', '\x01'};
-  if (std::memcmp(start, kPrtMagic, sizeof kPrtMagic) == 0) return Kind::Particles;
+  if (isParticleFile(path)) return Kind::Particles;
   if (std::memcmp(start, kExrMagic, sizeof kExrMagic) == 0) return Kind::Picture;
   const fs::path extension = fs::path(path).extension();
-  if (extension == ".prt") return Kind::Particles;
+  if (extension == ".prt" || extension == ".npy") return Kind::Particles;
   if (extension == ".exr") return Kind::Picture;
   if (extension == ".json") return Kind::Scene;
-  throw InputError(path, "", "a PRT particle file, an OpenEXR picture or a scene (.json)", "none of these",
-                   "of a scene's other inputs mote info says nothing");
+  throw InputError(path, "",
+                   fmt::format("a particle file ({}), an OpenEXR picture or a scene (.json)", particleFormats()),
+                   "none of these", "of a scene's other inputs mote info says nothing");
 }
 
 void info(const std::vector<std::string>& files, bool json) {

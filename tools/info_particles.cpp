@@ -8,8 +8,8 @@
 #include <type_traits>
 
 #include "host/core/parallel.h"
-#include "host/particles/prt_reader.h"
-#include "host/particles/prt_visit.h"
+#include "host/particles/formats/number_visit.h"
+#include "host/particles/formats/particle_file.h"
 #include "host/particles/spacing.h"
 #include "tools/info.h"
 
@@ -97,22 +97,22 @@ Json statisticsOf(const std::vector<std::byte>& raw, std::size_t count, std::uin
   return {{"not_finite", all.notFinite}, {"min", least}, {"mean", mean}, {"max", greatest}};
 }
 
-Json channelJson(const PrtChannel& channel, const std::vector<std::byte>& raw, std::size_t count) {
-  Json json = {{"name", channel.name}, {"type", prtTypeName(channel.type)}, {"arity", channel.arity}};
-  json.update(withPrtType(channel.type, [&]<class T>(T) { return statisticsOf<T>(raw, count, channel.arity); }));
+Json channelJson(const Channel& channel, const std::vector<std::byte>& raw, std::size_t count) {
+  Json json = {{"name", channel.name}, {"type", numberName(channel.type)}, {"arity", channel.arity}};
+  json.update(withNumberType(channel.type, [&]<class T>(T) { return statisticsOf<T>(raw, count, channel.arity); }));
   return json;
 }
 
 /// All channels, as many in one pass over the file as fit the memory that is set aside for them.
-Json channelsJson(const PrtReader& file) {
+Json channelsJson(const ParticleFile& file) {
   Json list = Json::array();
-  const std::vector<PrtChannel>& channels = file.header().channels;
+  const std::vector<Channel>& channels = file.channels();
   for (std::size_t begin = 0, end = 0; begin < channels.size(); begin = end) {
     std::uint64_t bytes = 0;
     while (end < channels.size() && (end == begin || bytes + file.count() * channels[end].bytes() <= kBytesAtOnce))
       bytes += file.count() * channels[end++].bytes();
     std::vector<std::vector<std::byte>> raw(end - begin);
-    std::vector<PrtRequest> requests;
+    std::vector<ChannelRequest> requests;
     for (std::size_t k = begin; k < end; ++k) requests.push_back({channels[k].name, &raw[k - begin]});
     file.read(requests);
     for (std::size_t k = begin; k < end; ++k) list.push_back(channelJson(channels[k], raw[k - begin], file.count()));
@@ -120,20 +120,20 @@ Json channelsJson(const PrtReader& file) {
   return list;
 }
 
-Json metadataJson(const PrtHeader& header) {
+Json metadataJson(const ParticleFile& file) {
   Json list = Json::array();
-  for (const PrtMetadata& m : header.metadata) {
+  for (const Metadata& m : file.metadata()) {
     Json entry = {{"channel", m.channel}, {"name", m.name}};
-    if (m.type == kPrtText) {
+    if (m.type == kMetadataText) {
       entry["type"] = "text", entry["value"] = m.bytes;
     } else {
-      const auto type = static_cast<PrtType>(m.type);
+      const auto type = static_cast<NumberType>(m.type);
       Json values = Json::array();
-      withPrtType(type, [&]<class T>(T) {
+      withNumberType(type, [&]<class T>(T) {
         for (std::size_t at = 0; at + sizeof(T) <= m.bytes.size(); at += sizeof(T))
           values.push_back(shown(numberAt<T>(reinterpret_cast<const std::byte*>(m.bytes.data()) + at)));
       });
-      entry["type"] = prtTypeName(type), entry["value"] = values;
+      entry["type"] = numberName(type), entry["value"] = values;
     }
     list.push_back(std::move(entry));
   }
@@ -147,9 +147,9 @@ const Json* channelNamed(const Json& channels, const char* name) {
 }
 
 /// "radius": "auto" of the scene: 1.5 × the mean distance to the nearest 8, of the particles that have a place.
-Json autoRadius(const PrtReader& file) {
+Json autoRadius(const ParticleFile& file) {
   std::vector<vec3> positions;
-  const PrtRequest request{"Position", &positions};
+  const ChannelRequest request{"Position", &positions};
   file.read({&request, 1});
   std::erase_if(positions,
                 [](const vec3& p) { return !(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)); });
@@ -159,13 +159,13 @@ Json autoRadius(const PrtReader& file) {
       {"from", "auto: 1.5 × the mean distance to the nearest 8"}, {"min", radius}, {"mean", radius}, {"max", radius}};
 }
 
-Json radiusJson(const PrtReader& file, const Json& channels) {
+Json radiusJson(const ParticleFile& file, const Json& channels) {
   if (const Json* radius = channelNamed(channels, "Radius"))
     return {{"from", "channel Radius"},
             {"min", (*radius)["min"][0]},
             {"mean", (*radius)["mean"][0]},
             {"max", (*radius)["max"][0]}};
-  const PrtChannel* position = file.header().channel("Position");
+  const Channel* position = file.channel("Position");
   if (!position || position->arity < 3) return {{"from", "none: there is no Position of arity 3"}};
   return autoRadius(file);
 }
@@ -202,16 +202,18 @@ std::string metadataText(const Json& entry) {
 }  // namespace
 
 Json describeParticles(const std::string& path) {
-  const PrtReader file(path);
-  const PrtHeader& header = file.header();
+  const std::unique_ptr<ParticleFile> opened = openParticleFile(path);
+  const ParticleFile& file = *opened;
   const Json channels = channelsJson(file);
+  std::size_t bytes = 0;
+  for (const Channel& channel : file.channels()) bytes += channel.bytes();
   Json info = {{"file", path},
                {"kind", "particles"},
-               {"format", fmt::format("PRT 1.{}", header.minorVersion)},
-               {"count", header.count},
-               {"bytes_per_particle", header.particleBytes},
+               {"format", file.format()},
+               {"count", file.count()},
+               {"bytes_per_particle", bytes},
                {"channels", channels},
-               {"metadata", metadataJson(header)}};
+               {"metadata", metadataJson(file)}};
   const Json* position = channelNamed(channels, "Position");
   if (position && (*position)["arity"] >= 3)
     info["bounds"] = {{"min", Json((*position)["min"].begin(), (*position)["min"].begin() + 3)},

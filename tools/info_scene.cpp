@@ -9,7 +9,7 @@
 #include "host/core/error.h"
 #include "host/core/parallel.h"
 #include "host/octree/octree.h"
-#include "host/particles/prt_reader.h"
+#include "host/particles/our_channels.h"
 #include "host/scene/camera_path.h"
 #include "host/scene/frame_path.h"
 #include "host/scene/missing_file.h"
@@ -54,12 +54,11 @@ SourceFacts fileFacts(const ParticleSource& source, int frame) {
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored))
     throw InputError(path, "", "a particle file", "no such file", nearestNames(source.file, path));
-  const PrtReader file(path);
+  const std::unique_ptr<ParticleFile> file = openParticleFile(path);
   const auto has = [&](const std::string& ours) {
-    const auto renamed = source.channels.find(ours);
-    return file.header().channel(renamed == source.channels.end() ? ours : renamed->second) != nullptr;
+    return file->channel(nameInFile(source, *file, ours).theirs) != nullptr;
   };
-  return {.count = file.count(),
+  return {.count = file->count(),
           .from = path,
           .radius = radiusText(source, has("Radius")),
           .color = has("Color"),

@@ -4,7 +4,7 @@
 #include "host/core/log.h"
 #include "host/core/output_file.h"
 #include "host/core/parallel.h"
-#include "host/particles/prt_writer.h"
+#include "host/particles/formats/prt_writer.h"
 #include "host/scene/frame_path.h"
 #include "host/scene/scene_reader.h"
 #include "tools/render.h"

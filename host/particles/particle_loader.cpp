@@ -13,7 +13,7 @@
 #include "host/core/log.h"
 #include "host/core/parallel.h"
 #include "host/particles/generate.h"
-#include "host/particles/prt_reader.h"
+#include "host/particles/our_channels.h"
 #include "host/particles/spacing.h"
 #include "host/scene/frame_path.h"
 #include "host/scene/missing_file.h"
@@ -21,8 +21,6 @@
 namespace mote {
 namespace {
 
-constexpr const char* kOurChannels[] = {"Position",   "Radius",   "Density",  "Color",
-                                        "Absorption", "Emission", "Velocity", "ID"};
 constexpr std::size_t kGrain = 1 << 15;
 
 /// A source's particles and the name that messages about them start with.
@@ -36,32 +34,21 @@ std::string scenePlace(const ParticleSource& source) { return source.pointer.emp
 
 // ---- reading ----
 
-/// The file's name for one of our channels, and whether the scene asked for it by name.
-struct ChannelName {
-  std::string theirs;
-  bool asked = false;
-};
-
-ChannelName nameOf(const ParticleSource& source, const std::string& ours) {
-  const auto found = source.channels.find(ours);
-  return found == source.channels.end() ? ChannelName{ours} : ChannelName{found->second, true};
-}
-
-[[noreturn]] void throwMissingChannel(const ParticleSource& source, const PrtReader& file, const std::string& field,
+[[noreturn]] void throwMissingChannel(const ParticleSource& source, const ParticleFile& file, const std::string& field,
                                       const std::string& name) {
   throw InputError(scenePlace(source), field, fmt::format("a channel of {}", file.path()), fmt::format("'{}'", name),
-                   "it has " + file.header().describeChannels());
+                   "it has " + describeChannels(file.channels()));
 }
 
 /// True if the file has the channel; InputError if it has not but was asked for it.
-bool wanted(const ParticleSource& source, const PrtReader& file, const std::string& ours, const ChannelName& name) {
-  if (file.header().channel(name.theirs)) return true;
+bool wanted(const ParticleSource& source, const ParticleFile& file, const std::string& ours, const ChannelName& name) {
+  if (file.channel(name.theirs)) return true;
   if (name.asked) throwMissingChannel(source, file, "channels/" + ours, name.theirs);
   return false;
 }
 
-void requireVector(const PrtReader& file, const std::string& name) {
-  const PrtChannel* channel = file.header().channel(name);
+void requireVector(const ParticleFile& file, const std::string& name) {
+  const Channel* channel = file.channel(name);
   if (channel && channel->arity < 3)
     throw InputError(file.path(), fmt::format("channel '{}'", name), "arity 3",
                      fmt::format("arity {}", channel->arity));
@@ -69,61 +56,59 @@ void requireVector(const PrtReader& file, const std::string& name) {
 
 void checkChannelKeys(const ParticleSource& source) {
   for (const auto& [ours, theirs] : source.channels)
-    if (std::find(std::begin(kOurChannels), std::end(kOurChannels), ours) == std::end(kOurChannels))
-      throw InputError(scenePlace(source), "channels",
-                       "Position, Radius, Density, Color, Absorption, Emission, Velocity or ID",
-                       fmt::format("'{}'", ours));
+    if (!isOurChannel(ours)) throw InputError(scenePlace(source), "channels", ourChannels(), fmt::format("'{}'", ours));
 }
 
-PrtReader openFile(const ParticleSource& source, const std::string& path) {
+std::unique_ptr<ParticleFile> openFile(const ParticleSource& source, const std::string& path) {
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored))
     throw InputError(path, "", "a particle file", "no such file", nearestNames(source.file, path));
-  return PrtReader(path);
+  return openParticleFile(path);
 }
 
 /// Which channel the radii come from, if any.
-std::optional<std::string> radiusChannel(const ParticleSource& source, const PrtReader& file) {
+std::optional<std::string> radiusChannel(const ParticleSource& source, const ParticleFile& file) {
   const RadiusRule& rule = source.radius;
   if (rule.kind == RadiusRule::Kind::Number) return std::nullopt;
   if (rule.kind == RadiusRule::Kind::Channel) {
     const auto mapped = source.channels.find(rule.channel);
     const std::string name = mapped == source.channels.end() ? rule.channel : mapped->second;
-    if (!file.header().channel(name)) throwMissingChannel(source, file, "radius/channel", name);
+    if (!file.channel(name)) throwMissingChannel(source, file, "radius/channel", name);
     return name;
   }
-  const ChannelName name = nameOf(source, "Radius");
+  const ChannelName name = nameInFile(source, file, "Radius");
   return wanted(source, file, "Radius", name) ? std::optional(name.theirs) : std::nullopt;
 }
 
 Loaded readFile(const ParticleSource& source, const std::string& path) {
   checkChannelKeys(source);
-  const PrtReader file = openFile(source, path);
+  const std::unique_ptr<ParticleFile> opened = openFile(source, path);
+  const ParticleFile& file = *opened;
   Loaded loaded;
   loaded.place = path;
   ParticleSet& set = loaded.set;
-  std::vector<PrtRequest> requests;
+  std::vector<ChannelRequest> requests;
 
-  const ChannelName position = nameOf(source, "Position"), velocity = nameOf(source, "Velocity");
+  const ChannelName position = nameInFile(source, file, "Position"), velocity = nameInFile(source, file, "Velocity");
   if (!wanted(source, file, "Position", position)) throwMissingChannel(source, file, "", position.theirs);
   requireVector(file, position.theirs);
   requests.push_back({position.theirs, &set.position});
   if (const auto radius = radiusChannel(source, file)) requests.push_back({*radius, &set.radius});
-  if (const auto name = nameOf(source, "Density"); wanted(source, file, "Density", name))
+  if (const auto name = nameInFile(source, file, "Density"); wanted(source, file, "Density", name))
     requests.push_back({name.theirs, &set.density});
-  if (const auto name = nameOf(source, "Color"); wanted(source, file, "Color", name)) {
+  if (const auto name = nameInFile(source, file, "Color"); wanted(source, file, "Color", name)) {
     requests.push_back({name.theirs, &set.color});
     loaded.hasColor = true;
   }
-  if (const auto name = nameOf(source, "Absorption"); wanted(source, file, "Absorption", name))
+  if (const auto name = nameInFile(source, file, "Absorption"); wanted(source, file, "Absorption", name))
     requests.push_back({name.theirs, &set.absorption});
-  if (const auto name = nameOf(source, "Emission"); wanted(source, file, "Emission", name))
+  if (const auto name = nameInFile(source, file, "Emission"); wanted(source, file, "Emission", name))
     requests.push_back({name.theirs, &set.emission});
   if (wanted(source, file, "Velocity", velocity)) {
     requireVector(file, velocity.theirs);
     requests.push_back({velocity.theirs, &set.velocity});
   }
-  if (const auto name = nameOf(source, "ID"); wanted(source, file, "ID", name))
+  if (const auto name = nameInFile(source, file, "ID"); wanted(source, file, "ID", name))
     requests.push_back({name.theirs, &set.id});
   file.read(requests);
   if (set.density.empty()) set.density.assign(set.size(), source.density);

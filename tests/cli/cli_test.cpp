@@ -13,8 +13,8 @@
 
 #include "host/core/output_file.h"
 #include "host/image/exr.h"
-#include "host/particles/prt_reader.h"
-#include "host/particles/prt_writer.h"
+#include "host/particles/formats/prt_reader.h"
+#include "host/particles/formats/prt_writer.h"
 #include "tests/cli/mote_program.h"
 
 namespace mote {
@@ -174,7 +174,7 @@ TEST(MoteGenerate, RecordsWhatItsFilesAreMadeOf) {
   const PrtReader file(folder.file("p.prt"));
   for (const char* channel : {"Position", "Radius", "Density", "Velocity", "ID"})
     EXPECT_NE(file.header().channel(channel), nullptr) << channel;
-  const PrtMetadata expected = PrtMetadata::int32("", "CoordSys", 1);
+  const Metadata expected = Metadata::int32("", "CoordSys", 1);
   ASSERT_NE(file.header().meta("", "CoordSys"), nullptr);
   EXPECT_EQ(file.header().meta("", "CoordSys")->bytes, expected.bytes);
   const std::uint32_t rate[] = {24, 1};
@@ -232,7 +232,7 @@ TEST(MoteInterrupted, ExitsWith130AndLeavesOnlyWholeFiles) {
     EXPECT_FALSE(hasTemporary(folder));
     for (const std::string& name : folder.entries()) {
       std::vector<vec3> positions;
-      const PrtRequest request{"Position", &positions};
+      const ChannelRequest request{"Position", &positions};
       PrtReader(folder.file(name)).read({&request, 1});
       EXPECT_EQ(positions.size(), 100'000u) << name;
     }
@@ -371,7 +371,7 @@ TEST(MoteInfo, RefusesWhatItCannotRead) {
   writeBytes(folder.file("fake.prt"), "no particles at all");
   writeBytes(folder.file("fake.exr"), "no picture at all");
   const std::pair<std::string, std::string> cases[] = {
-      {folder.file("notes.txt"), "a PRT particle file, an OpenEXR picture or a scene"},
+      {folder.file("notes.txt"), "a particle file (PRT 1.0 and 1.1, NPY, PLY"},
       {folder.file("fake.prt"), "fake.prt"},
       {folder.file("fake.exr"), "fake.exr"},
       {folder.file("note.txt"), "nearest names in its folder: 'notes.txt'"},

@@ -10,8 +10,8 @@
 #include "host/image/compare.h"
 #include "host/image/exr.h"
 #include "host/image/png.h"
+#include "host/particles/formats/prt_writer.h"
 #include "host/particles/generate.h"
-#include "host/particles/prt_writer.h"
 #include "tests/cli/mote_program.h"
 
 namespace mote::test {

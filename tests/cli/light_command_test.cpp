@@ -1,7 +1,7 @@
 // `mote light` checked as anybody could check it: from the particles in its own output, by the definition.
 #include <cmath>
 
-#include "host/particles/prt_reader.h"
+#include "host/particles/formats/prt_reader.h"
 #include "tests/cli/mote_program.h"
 #include "tests/support/lighting_oracle.h"
 
@@ -17,13 +17,13 @@ struct LitFile {
 LitFile readLit(const std::string& path) {
   LitFile lit;
   const PrtReader reader(path);
-  const std::vector<PrtRequest> requests{{"Position", &lit.position},
-                                         {"Lighting", &lit.lighting},
-                                         {"Radius", &lit.radius},
-                                         {"Density", &lit.density},
-                                         {"ID", &lit.id},
-                                         {"Transmittance_lamp", &lit.lamp},
-                                         {"Transmittance_sun", &lit.sun}};
+  const std::vector<ChannelRequest> requests{{"Position", &lit.position},
+                                             {"Lighting", &lit.lighting},
+                                             {"Radius", &lit.radius},
+                                             {"Density", &lit.density},
+                                             {"ID", &lit.id},
+                                             {"Transmittance_lamp", &lit.lamp},
+                                             {"Transmittance_sun", &lit.sun}};
   reader.read(requests);
   return lit;
 }

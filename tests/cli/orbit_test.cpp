@@ -7,7 +7,7 @@
 
 #include "host/core/random.h"
 #include "host/image/exr.h"
-#include "host/particles/prt_writer.h"
+#include "host/particles/formats/prt_writer.h"
 #include "tests/cli/mote_program.h"
 
 namespace mote::test {

@@ -10,7 +10,7 @@
 #include "host/core/random.h"
 #include "host/image/exr.h"
 #include "host/image/png.h"
-#include "host/particles/prt_writer.h"
+#include "host/particles/formats/prt_writer.h"
 #include "tests/cli/mote_program.h"
 
 namespace mote {

@@ -14,8 +14,8 @@
 #include "host/core/parallel.h"
 #include "host/core/timer.h"
 #include "host/image/exr.h"
+#include "host/particles/formats/prt_writer.h"
 #include "host/particles/generate.h"
-#include "host/particles/prt_writer.h"
 #include "tools/bench/bench_picture.h"
 #include "tools/render.h"
 

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <string>
 
-#include "host/particles/prt_format.h"
+#include "host/particles/formats/prt_format.h"
 
 namespace mote {
 

@@ -7,22 +7,22 @@
 #include <vector>
 
 #include "host/core/vec.h"
+#include "host/particles/formats/prt_format.h"
 #include "host/particles/particle_set.h"
-#include "host/particles/prt_format.h"
 
 namespace mote {
 
 /// One channel as it stands in memory, tightly packed; the caller keeps the array alive while it is written.
 struct PrtColumn {
   std::string name;  ///< [A-Za-z_][A-Za-z0-9_]{0,30}
-  PrtType type = PrtType::F32;
+  NumberType type = NumberType::F32;
   std::uint32_t arity = 1;
   std::span<const std::byte> bytes;  ///< particles × arity numbers of `type`
 
   static PrtColumn of(std::string name, std::span<const float> values);          ///< float32
   static PrtColumn of(std::string name, std::span<const vec3> values);           ///< 3 × float32
   static PrtColumn of(std::string name, std::span<const std::uint64_t> values);  ///< uint64
-  static PrtColumn raw(std::string name, PrtType type, std::uint32_t arity, std::span<const std::byte> values);
+  static PrtColumn raw(std::string name, NumberType type, std::uint32_t arity, std::span<const std::byte> values);
 };
 
 struct PrtWriteOptions {
@@ -35,7 +35,7 @@ struct PrtWriteOptions {
 /// metadata of channels that are not written are left out. The bytes do not depend on the number of threads.
 /// Throws InputError where the path cannot be written or a channel's name is none for PRT, MachineError where the disk
 /// refuses; then nothing is left behind.
-void writePrt(const std::string& path, std::span<const PrtColumn> columns, std::span<const PrtMetadata> metadata = {},
+void writePrt(const std::string& path, std::span<const PrtColumn> columns, std::span<const Metadata> metadata = {},
               const PrtWriteOptions& options = {});
 
 /// The set's own channels, in this order: Position, Radius, Density, and where it has them Color, Absorption, Emission,

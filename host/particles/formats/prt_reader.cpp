@@ -1,7 +1,6 @@
-#include "host/particles/prt_reader.h"
+#include "host/particles/formats/prt_reader.h"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 #include <tbb/parallel_pipeline.h>
 #include <zlib.h>
 
@@ -13,8 +12,8 @@
 
 #include "host/core/error.h"
 #include "host/core/log.h"
-#include "host/particles/prt_header.h"
-#include "host/particles/prt_visit.h"
+#include "host/particles/formats/channel_sink.h"
+#include "host/particles/formats/prt_header.h"
 
 namespace mote {
 namespace {
@@ -29,81 +28,10 @@ constexpr std::size_t kInputBytes = 1 << 17;
 // that expand further grow their arrays as the data arrive.
 constexpr std::uint64_t kReservedExpansion = 8;
 
-template <class To, class From>
-To converted(From value) {
-  if constexpr (std::is_same_v<To, std::uint64_t> && !std::is_integral_v<From>) {
-    const double number = static_cast<double>(value);
-    return number >= 0 && number < 0x1p64 ? static_cast<std::uint64_t>(number) : 0;
-  } else {
-    return static_cast<To>(value);
-  }
-}
-
-/// Copies `components` numbers of each of `count` particles; source numbers may stand unaligned.
-template <class From, class To>
-void convertColumn(const std::byte* from, std::size_t stride, std::size_t count, int components, bool broadcast,
-                   To* to) {
-  for (std::size_t i = 0; i < count; ++i, from += stride)
-    for (int c = 0; c < components; ++c) {
-      From value;
-      std::memcpy(&value, from + (broadcast ? 0 : c * sizeof(From)), sizeof value);
-      *to++ = converted<To>(value);
-    }
-}
-
-template <class To>
-void convertTyped(PrtType type, const std::byte* from, std::size_t stride, std::size_t count, int components,
-                  bool broadcast, To* to) {
-  withPrtType(type, [&]<class From>(From) { convertColumn<From>(from, stride, count, components, broadcast, to); });
-}
-
-/// One request, resolved against the header.
-class Column {
- public:
-  Column(const PrtReader& reader, const PrtRequest& request) : target_(request.target) {
-    const PrtChannel* channel = reader.header().channel(request.channel);
-    if (!channel)
-      throw InputError(reader.path(), "", fmt::format("a channel '{}'", request.channel), "none of that name",
-                       "it has " + reader.header().describeChannels());
-    channel_ = *channel;
-    const bool isVector = std::holds_alternative<std::vector<vec3>*>(target_);
-    const bool isRaw = std::holds_alternative<std::vector<std::byte>*>(target_);
-    const bool fits = isRaw || channel_.arity == 1 || (isVector && channel_.arity >= 3);
-    if (!fits)
-      throw InputError(reader.path(), fmt::format("channel '{}'", request.channel),
-                       isVector ? "arity 3 (or 1, or more)" : "arity 1", fmt::format("arity {}", channel_.arity));
-    perParticle_ = isRaw ? channel_.bytes() : 1;
-  }
-
-  void reserve(std::uint64_t particles) {
-    std::visit([&](auto* to) { to->clear(), to->reserve(particles * perParticle_); }, target_);
-  }
-
-  void append(const std::byte* block, std::size_t stride, std::size_t count) {
-    const std::byte* from = block + channel_.offset;
-    std::visit([&](auto* to) { appendTo(*to, from, stride, count); }, target_);
-  }
-
- private:
-  void appendTo(std::vector<std::byte>& to, const std::byte* from, std::size_t stride, std::size_t count) {
-    for (std::size_t i = 0; i < count; ++i, from += stride) to.insert(to.end(), from, from + perParticle_);
-  }
-  void appendTo(std::vector<vec3>& to, const std::byte* from, std::size_t stride, std::size_t count) {
-    const std::size_t old = to.size();
-    to.resize(old + count);
-    static_assert(sizeof(vec3) == 3 * sizeof(float));
-    if (count > 0) convertTyped(channel_.type, from, stride, count, 3, channel_.arity == 1, &to[old].x);
-  }
-  template <class T>
-  void appendTo(std::vector<T>& to, const std::byte* from, std::size_t stride, std::size_t count) {
-    const std::size_t old = to.size();
-    to.resize(old + count);
-    if (count > 0) convertTyped(channel_.type, from, stride, count, 1, false, &to[old]);
-  }
-
-  std::variant<std::vector<float>*, std::vector<vec3>*, std::vector<std::uint64_t>*, std::vector<std::byte>*> target_;
-  PrtChannel channel_;
-  std::size_t perParticle_ = 1;
+/// A sink, and where its channel stands in a packed particle.
+struct Column {
+  ChannelSink sink;
+  std::size_t offset;
 };
 
 /// The file's zlib stream as a source of bytes.
@@ -190,19 +118,20 @@ struct Block {
 
 }  // namespace
 
-PrtReader::PrtReader(std::string path) : path_(std::move(path)) {
-  struct stat facts {};
-  if (::stat(path_.c_str(), &facts) != 0) throw InputError(path_, "", "a readable file", std::strerror(errno));
-  if (!S_ISREG(facts.st_mode))
-    throw InputError(path_, "", "a file", S_ISDIR(facts.st_mode) ? "a folder" : "a device or pipe");
-  file_.reset(std::fopen(path_.c_str(), "rbe"));
-  if (!file_) throw InputError(path_, "", "a readable file", std::strerror(errno));
-  fileBytes_ = static_cast<std::uint64_t>(facts.st_size);
+bool beginsAsPrt(std::span<const std::byte> start) {
+  constexpr std::size_t kName = 4;  // PRT 2 goes on otherwise, and the reader says that it is that
+  return start.size() >= kName && std::memcmp(start.data(), kPrtMagic, kName) == 0;
+}
 
-  ParsedPrtHeader parsed = parsePrtHeader(path_, file_.get(), fileBytes_);
+PrtReader::PrtReader(std::string path) : ParticleFile(path), file_(std::move(path)) {
+  ParsedPrtHeader parsed = parsePrtHeader(path_, file_.handle(), file_.bytes());
   header_ = std::move(parsed.header);
   dataBegin_ = parsed.dataBegin;
-  const std::uint64_t left = fileBytes_ - dataBegin_;
+  format_ = fmt::format("PRT 1.{}", header_.minorVersion);
+  count_ = header_.count;
+  channels_.assign(header_.channels.begin(), header_.channels.end());
+  metadata_ = header_.metadata;
+  const std::uint64_t left = file_.bytes() - dataBegin_;
   // particleBytes ≥ 1, and left × 1032 stays far below 2^64 for any file that exists; the division cannot overflow.
   if (header_.count > left * kMaxExpansion / header_.particleBytes)
     throw InputError(
@@ -212,21 +141,23 @@ PrtReader::PrtReader(std::string path) : path_(std::move(path)) {
         fmt::format("{}", header_.count), "the file is cut off or its header is damaged");
 }
 
-void PrtReader::read(std::span<const PrtRequest> requests) const {
+void PrtReader::read(std::span<const ChannelRequest> requests) const {
   std::vector<Column> columns;
-  for (const PrtRequest& request : requests) columns.emplace_back(*this, request);
-  if (fseeko(file_.get(), static_cast<off_t>(dataBegin_), SEEK_SET) != 0)
-    throw MachineError(fmt::format("{}: seeking to byte {} failed", path_, dataBegin_));
-  const std::uint64_t left = fileBytes_ - dataBegin_, count = header_.count;
+  for (const ChannelRequest& request : requests) {
+    ChannelSink sink(path_, channels_, request);
+    columns.push_back({sink, header_.channels[sink.index()].offset});
+  }
+  file_.seek(dataBegin_);
+  const std::uint64_t left = file_.bytes() - dataBegin_, count = header_.count;
   const std::size_t size = header_.particleBytes;
   const std::size_t perBlock = std::max<std::size_t>(1, kBlockBytes / size);
   try {
-    for (Column& column : columns) column.reserve(std::min(count, left * kReservedExpansion / size));
+    for (Column& column : columns) column.sink.reserve(std::min(count, left * kReservedExpansion / size));
     if (count == 0 && left == 0) return;
 
     // Two stages at once: one task decompresses a block while another converts the one before.
     constexpr std::size_t kBlocksInFlight = 4;
-    Inflater stream(path_, file_.get());
+    Inflater stream(path_, file_.handle());
     std::vector<Block> ring(kBlocksInFlight);
     std::uint64_t begun = 0, turn = 0;
     const auto decompress = [&](tbb::flow_control& flow) -> Block* {
@@ -240,13 +171,13 @@ void PrtReader::read(std::span<const PrtRequest> requests) const {
       return &block;
     };
     const auto convert = [&](Block* block) {
-      for (Column& column : columns) column.append(block->bytes.data(), size, block->particles);
+      for (Column& column : columns) column.sink.append(block->bytes.data() + column.offset, size, block->particles);
     };
     using tbb::filter_mode;
     tbb::parallel_pipeline(kBlocksInFlight, tbb::make_filter<void, Block*>(filter_mode::serial_in_order, decompress) &
                                                 tbb::make_filter<Block*, void>(filter_mode::serial_in_order, convert));
 
-    if (stream.hasMore() || (stream.ended() && dataBegin_ + stream.bytesIn() < fileBytes_))
+    if (stream.hasMore() || (stream.ended() && dataBegin_ + stream.bytesIn() < file_.bytes()))
       logWarning(fmt::format("{}: ignored data behind the last of its {} particles", path_, count));
     else if (!stream.ended())
       throw InputError(path_, "particle data", "a zlib stream with its checksum",

@@ -1,4 +1,4 @@
-#include "host/particles/prt_header.h"
+#include "host/particles/formats/prt_header.h"
 
 #include <fmt/format.h>
 
@@ -141,7 +141,7 @@ struct Parser {
 
   void parseMeta(const std::string& chunk) {
     std::string_view rest = chunk;
-    PrtMetadata value;
+    Metadata value;
     value.channel = takeName(rest, "channel name");
     value.name = takeName(rest, "value name");
     // Old Sequoia files name channel values "Channel.Prop" in the file's scope.
@@ -156,16 +156,16 @@ struct Parser {
     if (rest.size() < 4) fail(field, "a type of 4 bytes", fmt::format("{} bytes", rest.size()));
     std::memcpy(&value.type, rest.data(), 4);
     rest.remove_prefix(4);
-    if (value.type == kPrtText) {
+    if (value.type == kMetadataText) {
       const std::size_t zero = rest.find('\0');
       if (zero == std::string_view::npos) fail(field, "text with a zero at its end", "none");
       value.bytes = rest.substr(0, zero);
     } else {
-      if (value.type < 0 || value.type >= kPrtTypes)
+      if (value.type < 0 || value.type >= kNumberTypes)
         fail(field, "a type of 0 to 10, or -1 for text", fmt::format("{}", value.type));
-      const std::size_t size = prtTypeSize(static_cast<PrtType>(value.type));
+      const std::size_t size = numberSize(static_cast<NumberType>(value.type));
       if (rest.size() % size != 0)
-        fail(field, fmt::format("a multiple of {} bytes ({})", size, prtTypeName(static_cast<PrtType>(value.type))),
+        fail(field, fmt::format("a multiple of {} bytes ({})", size, numberName(static_cast<NumberType>(value.type))),
              fmt::format("{} bytes", rest.size()));
       value.bytes = rest;
     }
@@ -216,15 +216,15 @@ struct Parser {
       fail(fmt::format("channel {}: name", index), "a letter or '_', then letters, digits and '_'",
            shown(channel.name));
     const std::string field = fmt::format("channel '{}'", channel.name);
-    if (type < 0 || type >= kPrtTypes) fail(field + ": type", "0 to 10", fmt::format("{}", type));
+    if (type < 0 || type >= kNumberTypes) fail(field + ": type", "0 to 10", fmt::format("{}", type));
     if (arity < 1) fail(field + ": arity", "1 or more", fmt::format("{}", arity));
     if (offset < 0) fail(field + ": offset", "0 or more", fmt::format("{}", offset));
-    channel.type = static_cast<PrtType>(type);
+    channel.type = static_cast<NumberType>(type);
     channel.arity = static_cast<std::uint32_t>(arity);
     channel.offset = static_cast<std::uint32_t>(offset);
     if (channel.offset + std::uint64_t{channel.bytes()} > kMaxParticleBytes)
       fail(field, fmt::format("an end within {} bytes of the particle's start", kMaxParticleBytes),
-           fmt::format("offset {}, {} × {}", offset, arity, prtTypeName(channel.type)));
+           fmt::format("offset {}, {} × {}", offset, arity, numberName(channel.type)));
     return channel;
   }
 
@@ -247,7 +247,7 @@ struct Parser {
   /// What metadata say about channels, once these are known.
   void checkChannelMetadata() {
     auto& all = header.metadata;
-    for (const PrtMetadata& m : all) {
+    for (const Metadata& m : all) {
       if (m.channel.empty()) continue;
       const PrtChannel* channel = header.channel(m.channel);
       if (!channel)
@@ -256,11 +256,12 @@ struct Parser {
       else if (m.name == "Interpretation")
         checkInterpretation(m, *channel);
     }
-    std::erase_if(all, [&](const PrtMetadata& m) { return !m.channel.empty() && !header.channel(m.channel); });
+    std::erase_if(all, [&](const Metadata& m) { return !m.channel.empty() && !header.channel(m.channel); });
   }
 
-  void checkInterpretation(const PrtMetadata& m, const PrtChannel& channel) const {
-    if (m.type != static_cast<std::int32_t>(PrtType::I32) || m.bytes.size() != 4) return;  // somebody else's property
+  void checkInterpretation(const Metadata& m, const PrtChannel& channel) const {
+    if (m.type != static_cast<std::int32_t>(NumberType::I32) || m.bytes.size() != 4)
+      return;  // somebody else's property
     std::int32_t kind;
     std::memcpy(&kind, m.bytes.data(), 4);
     if ((kind == 4 || kind == 5) && channel.arity != 4)

@@ -1,4 +1,4 @@
-#include "host/particles/prt_writer.h"
+#include "host/particles/formats/prt_writer.h"
 
 #include <fmt/format.h>
 #include <tbb/parallel_pipeline.h>
@@ -39,7 +39,7 @@ void appendChunk(std::string& out, std::string_view kind, std::string_view data)
   out += data;
 }
 
-void appendMetadata(std::string& out, const PrtMetadata& m) {
+void appendMetadata(std::string& out, const Metadata& m) {
   MOTE_CHECK(m.name.size() + m.channel.size(), <=, std::size_t{62});
   std::string data = m.channel;
   data += '\0';
@@ -47,7 +47,7 @@ void appendMetadata(std::string& out, const PrtMetadata& m) {
   data += '\0';
   appendNumber(data, m.type);
   data += m.bytes;
-  if (m.type == kPrtText) data += '\0';
+  if (m.type == kMetadataText) data += '\0';
   appendChunk(out, "Meta", data);
 }
 
@@ -55,7 +55,7 @@ const PrtColumn& positionColumn(std::span<const PrtColumn> columns) {
   const auto found =
       std::find_if(columns.begin(), columns.end(), [](const PrtColumn& c) { return c.name == "Position"; });
   MOTE_CHECK(found != columns.end(), ==, true);
-  MOTE_CHECK(static_cast<int>(found->type), ==, static_cast<int>(PrtType::F32));
+  MOTE_CHECK(static_cast<int>(found->type), ==, static_cast<int>(NumberType::F32));
   MOTE_CHECK(found->arity, ==, 3u);
   return *found;
 }
@@ -87,23 +87,23 @@ Layout layoutOf(const std::string& path, std::span<const PrtColumn> columns) {
       throw InputError(path, "channel name", "a letter or '_', then up to 30 letters, digits and '_'",
                        fmt::format("'{}'", c.name));
     MOTE_CHECK(names.insert(c.name).second, ==, true);
-    layout.channels.push_back({c.name, c.type, c.arity, static_cast<std::uint32_t>(layout.particleBytes)});
+    layout.channels.push_back({{c.name, c.type, c.arity}, static_cast<std::uint32_t>(layout.particleBytes)});
     MOTE_CHECK(c.bytes.size(), ==, layout.count * layout.channels.back().bytes());
     layout.particleBytes += layout.channels.back().bytes();
   }
   return layout;
 }
 
-std::string headerBytes(const Layout& layout, std::span<const PrtColumn> columns, std::span<const PrtMetadata> metadata,
+std::string headerBytes(const Layout& layout, std::span<const PrtColumn> columns, std::span<const Metadata> metadata,
                         const PrtWriteOptions& options) {
   std::string chunks;
   if (options.minorVersion == 1) {
-    appendMetadata(chunks, PrtMetadata::float32s("", "BoundBox", boundBox(positionColumn(columns), layout.count)));
+    appendMetadata(chunks, Metadata::float32s("", "BoundBox", boundBox(positionColumn(columns), layout.count)));
     const auto isWritten = [&](const std::string& name) {
       return name.empty() ||
              std::any_of(columns.begin(), columns.end(), [&](const PrtColumn& c) { return c.name == name; });
     };
-    for (const PrtMetadata& m : metadata)
+    for (const Metadata& m : metadata)
       if (isWritten(m.channel) && !(m.channel.empty() && m.name == "BoundBox")) appendMetadata(chunks, m);
     appendChunk(chunks, "Stop", "");
   }
@@ -225,19 +225,19 @@ void writeParticles(Sink& sink, const Layout& layout, std::span<const PrtColumn>
 }  // namespace
 
 PrtColumn PrtColumn::of(std::string name, std::span<const float> values) {
-  return {std::move(name), PrtType::F32, 1, std::as_bytes(values)};
+  return {std::move(name), NumberType::F32, 1, std::as_bytes(values)};
 }
 PrtColumn PrtColumn::of(std::string name, std::span<const vec3> values) {
-  return {std::move(name), PrtType::F32, 3, std::as_bytes(values)};
+  return {std::move(name), NumberType::F32, 3, std::as_bytes(values)};
 }
 PrtColumn PrtColumn::of(std::string name, std::span<const std::uint64_t> values) {
-  return {std::move(name), PrtType::U64, 1, std::as_bytes(values)};
+  return {std::move(name), NumberType::U64, 1, std::as_bytes(values)};
 }
-PrtColumn PrtColumn::raw(std::string name, PrtType type, std::uint32_t arity, std::span<const std::byte> values) {
+PrtColumn PrtColumn::raw(std::string name, NumberType type, std::uint32_t arity, std::span<const std::byte> values) {
   return {std::move(name), type, arity, values};
 }
 
-void writePrt(const std::string& path, std::span<const PrtColumn> columns, std::span<const PrtMetadata> metadata,
+void writePrt(const std::string& path, std::span<const PrtColumn> columns, std::span<const Metadata> metadata,
               const PrtWriteOptions& options) {
   MOTE_CHECK(options.minorVersion == 0 || options.minorVersion == 1, ==, true);
   const Layout layout = layoutOf(path, columns);

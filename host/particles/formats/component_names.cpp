@@ -1,0 +1,99 @@
+#include "host/particles/formats/component_names.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "host/core/error.h"
+
+namespace mote {
+namespace {
+
+struct Vector {
+  std::array<std::string_view, 3> components;
+  std::string_view name;
+};
+constexpr Vector kVectors[] = {{{"x", "y", "z"}, "Position"},    {{"X", "Y", "Z"}, "Position"},
+                               {{"px", "py", "pz"}, "Position"}, {{"vx", "vy", "vz"}, "Velocity"},
+                               {{"nx", "ny", "nz"}, "Normal"},   {{"r", "g", "b"}, "Color"},
+                               {{"R", "G", "B"}, "Color"},       {{"red", "green", "blue"}, "Color"}};
+constexpr std::string_view kEndings[] = {"_x", "_y", "_z", ".x", ".y", ".z"};
+
+bool sideBySide(const PlacedChannel* c) {
+  const std::size_t size = numberSize(c[0].channel.type);
+  for (std::size_t k = 0; k < 3; ++k)
+    if (c[k].channel.arity != 1 || c[k].channel.type != c[0].channel.type || c[k].offset != c[0].offset + k * size)
+      return false;
+  return true;
+}
+
+/// The name of the vector that three scalars are.
+std::optional<std::string> vectorName(const PlacedChannel* c) {
+  for (const Vector& vector : kVectors)
+    if (std::equal(vector.components.begin(), vector.components.end(), c,
+                   [](std::string_view name, const PlacedChannel& own) { return own.channel.name == name; }))
+      return std::string(vector.name);
+  for (std::size_t first = 0; first < std::size(kEndings); first += 3) {
+    const std::string& name = c[0].channel.name;
+    if (name.size() <= 2 || !name.ends_with(kEndings[first])) continue;
+    const std::string base = name.substr(0, name.size() - 2);
+    if (c[1].channel.name == base + std::string(kEndings[first + 1]) &&
+        c[2].channel.name == base + std::string(kEndings[first + 2]))
+      return base;
+  }
+  return std::nullopt;
+}
+
+double scaleOfColor(NumberType type) {
+  return type == NumberType::U8 ? 1.0 / 255 : type == NumberType::U16 ? 1.0 / 65535 : 1;
+}
+
+}  // namespace
+
+std::vector<PlacedChannel> withVectors(const std::vector<PlacedChannel>& columns) {
+  std::vector<PlacedChannel> channels;
+  const auto taken = [&](const std::string& name) {
+    return std::any_of(columns.begin(), columns.end(), [&](const auto& c) { return c.channel.name == name; }) ||
+           std::any_of(channels.begin(), channels.end(), [&](const auto& c) { return c.channel.name == name; });
+  };
+  for (std::size_t k = 0; k < columns.size();) {
+    const PlacedChannel* c = &columns[k];
+    std::optional<std::string> name;
+    if (k + 3 <= columns.size() && sideBySide(c)) name = vectorName(c);
+    if (!name || taken(*name)) {
+      channels.push_back(columns[k++]);
+      continue;
+    }
+    PlacedChannel vector = *c;
+    vector.channel.name = *name, vector.channel.arity = 3;
+    if (*name == "Color") vector.channel.scale = scaleOfColor(vector.channel.type);
+    channels.push_back(vector);
+    k += 3;
+  }
+  return channels;
+}
+
+std::vector<PlacedChannel> plainColumns(const std::string& path, std::size_t width, NumberType type) {
+  if (width < 3)
+    throw InputError(path, "columns", "three or more, the first three of which are a position",
+                     fmt::format("{} number{} a particle", width, width == 1 ? "" : "s"));
+  std::vector<PlacedChannel> channels;
+  const auto add = [&](std::string name, std::uint32_t arity, std::size_t column) {
+    PlacedChannel placed;
+    placed.channel.name = std::move(name), placed.channel.type = type, placed.channel.arity = arity;
+    placed.offset = column * numberSize(type);
+    channels.push_back(std::move(placed));
+  };
+  add("Position", 3, 0);
+  if (width == 4) add("Density", 1, 3);
+  if (width == 6) add("Velocity", 3, 3);
+  if (width != 4 && width != 6)
+    for (std::size_t column = 3; column < width; ++column) add(fmt::format("Column{}", column), 1, column);
+  return channels;
+}
+
+}  // namespace mote

@@ -1,0 +1,79 @@
+#include "host/particles/formats/particle_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "host/core/error.h"
+#include "host/particles/formats/csv_reader.h"
+#include "host/particles/formats/input_file.h"
+#include "host/particles/formats/npy_reader.h"
+#include "host/particles/formats/ply_reader.h"
+#include "host/particles/formats/prt_reader.h"
+
+namespace mote {
+namespace {
+
+/// A format that is read. A new one is a file beside this one, and a line here.
+struct Format {
+  const char* name;  ///< for people
+  /// Whether a file that begins so is of this format; at most kStart bytes are given.
+  bool (*begins)(std::span<const std::byte> start);
+  std::unique_ptr<ParticleFile> (*open)(const std::string& path);
+};
+
+constexpr std::size_t kStart = 1 << 16;
+
+template <class Reader>
+std::unique_ptr<ParticleFile> open(const std::string& path) {
+  return std::make_unique<Reader>(path);
+}
+
+constexpr Format kFormats[] = {
+    {"PRT 1.0 and 1.1", beginsAsPrt, open<PrtReader>},
+    {"NPY", beginsAsNpy, open<NpyReader>},
+    {"PLY", beginsAsPly, open<PlyReader>},
+    {"CSV and other tables of numbers", beginsAsTable, open<CsvReader>},  // last: any text might be one
+};
+
+const Format* formatOf(const std::string& path, bool& empty) {
+  const std::vector<std::byte> start = InputFile(path).start(kStart);
+  empty = start.empty();
+  for (const Format& format : kFormats)
+    if (format.begins(start)) return &format;
+  return nullptr;
+}
+
+}  // namespace
+
+const Channel* ParticleFile::channel(std::string_view name) const {
+  const auto found = std::find_if(channels_.begin(), channels_.end(), [&](const Channel& c) { return c.name == name; });
+  return found == channels_.end() ? nullptr : &*found;
+}
+
+const Metadata* ParticleFile::meta(std::string_view channel, std::string_view name) const {
+  const auto found = std::find_if(metadata_.begin(), metadata_.end(),
+                                  [&](const Metadata& m) { return m.channel == channel && m.name == name; });
+  return found == metadata_.end() ? nullptr : &*found;
+}
+
+std::string particleFormats() {
+  std::string names;
+  for (const Format& format : kFormats) names += (names.empty() ? "" : ", ") + std::string(format.name);
+  return names;
+}
+
+bool isParticleFile(const std::string& path) {
+  bool empty = false;
+  return formatOf(path, empty) != nullptr;
+}
+
+std::unique_ptr<ParticleFile> openParticleFile(const std::string& path) {
+  bool empty = false;
+  if (const Format* format = formatOf(path, empty)) return format->open(path);
+  throw InputError(path, "", fmt::format("a particle file in a format that Mote reads ({})", particleFormats()),
+                   empty ? "an empty file" : "none of them",
+                   "numpy.save('particles.npy', array) with the columns x, y, z makes one that it does");
+}
+
+}  // namespace mote

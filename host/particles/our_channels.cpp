@@ -1,0 +1,51 @@
+#include "host/particles/our_channels.h"
+
+#include <algorithm>
+#include <array>
+
+namespace mote {
+namespace {
+
+/// The most common names first: Houdini's, Maya's, then those of simulations and scanners.
+struct OurChannel {
+  std::string_view ours;
+  std::array<std::string_view, 6> theirs;
+};
+constexpr OurChannel kChannels[] = {
+    {"Position", {"P", "position", "pos", "Coordinates", "coordinates", "points"}},
+    {"Radius", {"pscale", "radius", "radiusPP"}},
+    {"Density", {"density", "Mass", "mass", "Masses", "opacityPP"}},
+    {"Color", {"Cd", "color", "Colour", "colour", "rgbPP"}},
+    {"Absorption", {"absorption"}},
+    {"Emission", {"emission"}},
+    {"Velocity", {"v", "velocity", "vel", "Velocities"}},
+    {"ID", {"id", "particleId", "ParticleIDs", "ids"}},
+};
+
+}  // namespace
+
+std::string ourChannels() {
+  std::string names;
+  for (const OurChannel& channel : kChannels) {
+    const bool last = &channel == std::end(kChannels) - 1;
+    names += (names.empty() ? "" : last ? " or " : ", ") + std::string(channel.ours);
+  }
+  return names;
+}
+
+bool isOurChannel(std::string_view name) {
+  return std::any_of(std::begin(kChannels), std::end(kChannels), [&](const auto& c) { return c.ours == name; });
+}
+
+ChannelName nameInFile(const ParticleSource& source, const ParticleFile& file, const std::string& ours) {
+  const auto asked = source.channels.find(ours);
+  if (asked != source.channels.end()) return {asked->second, true};
+  if (!file.channel(ours))
+    for (const OurChannel& channel : kChannels)
+      if (channel.ours == ours)
+        for (const std::string_view theirs : channel.theirs)
+          if (!theirs.empty() && file.channel(theirs)) return {std::string(theirs), false};
+  return {ours, false};
+}
+
+}  // namespace mote

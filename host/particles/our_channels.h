@@ -1,0 +1,24 @@
+// Our channels and what they are called in files (docs/formats.md).
+#pragma once
+#include <string>
+#include <string_view>
+
+#include "host/particles/formats/particle_file.h"
+#include "host/scene/scene.h"
+
+namespace mote {
+
+/// "Position, Radius, Density …", for messages.
+std::string ourChannels();
+bool isOurChannel(std::string_view name);
+
+/// The file's name for one of our channels, and whether the scene asked for it by name.
+struct ChannelName {
+  std::string theirs;
+  bool asked = false;
+};
+/// What the scene says (`channels`); else our own name; else, where the file has none of that name, the first of the
+/// names that other programs use.
+ChannelName nameInFile(const ParticleSource& source, const ParticleFile& file, const std::string& ours);
+
+}  // namespace mote

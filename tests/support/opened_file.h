@@ -1,0 +1,74 @@
+// A particle file of given bytes, opened by its content, for tests of readers.
+#pragma once
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "host/core/error.h"
+#include "host/particles/formats/particle_file.h"
+#include "tests/support/temp_folder.h"
+
+namespace mote::test {
+
+struct OpenedFile {
+  TempFolder folder;
+  std::unique_ptr<ParticleFile> file;
+
+  explicit OpenedFile(const std::string& bytes) {
+    writeBytes(folder.file("particles"), bytes);
+    file = openParticleFile(folder.file("particles"));
+  }
+  template <class T>
+  std::vector<T> read(const std::string& channel) const {
+    std::vector<T> values;
+    const ChannelRequest request{channel, &values};
+    file->read({&request, 1});
+    return values;
+  }
+  /// All of it, raw.
+  void readAll() const {
+    for (const Channel& channel : file->channels()) read<std::byte>(channel.name);
+  }
+};
+
+/// Opening or reading it must throw an InputError whose message has these words.
+inline void expectFileRefused(const std::string& bytes, const std::vector<std::string>& words) {
+  try {
+    OpenedFile(bytes).readAll();
+    ADD_FAILURE() << "nothing was thrown; expected '" << (words.empty() ? "" : words[0]) << "'";
+  } catch (const InputError& error) {
+    for (const std::string& word : words)
+      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << word << " is not in: " << error.what();
+  }
+}
+
+/// Opens and reads the file with each of its bits flipped: refused or read, but no more than `mostParticles`.
+inline void flipEveryBit(const std::string& whole, std::uint64_t mostParticles) {
+  for (std::size_t bit = 0; bit < 8 * whole.size(); ++bit) {
+    std::string bytes = whole;
+    bytes[bit / 8] = static_cast<char>(bytes[bit / 8] ^ 1 << bit % 8);
+    try {
+      const OpenedFile opened(bytes);
+      EXPECT_LE(opened.file->count(), mostParticles) << "bit " << bit;
+      opened.readAll();
+    } catch (const InputError&) {
+    }
+  }
+}
+
+/// Numbers as bytes, one after another.
+template <class T>
+std::string rawNumbers(std::initializer_list<T> values, bool bigEndian = false) {
+  std::string bytes;
+  for (const T value : values) {
+    std::string one(sizeof(T), '\0');
+    std::memcpy(one.data(), &value, sizeof(T));
+    bytes += bigEndian ? std::string(one.rbegin(), one.rend()) : one;
+  }
+  return bytes;
+}
+
+}  // namespace mote::test
