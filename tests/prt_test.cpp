@@ -224,7 +224,7 @@ TEST(PrtReader, RefusesWhatIsNoPrt1) {
   file = {};
   file.version = 3;
   expectRefused(file, {"version", "got 3"});
-  expectRefused([] { PrtReader(sharedFile("prt/wnormals.prt")); }, {"PRT 2", "cannot read PRT 2 yet"});
+  expectRefused([] { PrtReader(sharedFile("prt/wnormals.prt")); }, {"a PRT 1.0 or 1.1 file", "PRT 2"});
   expectRefused([] { PrtReader("/nowhere/at/all.prt"); }, {"/nowhere/at/all.prt", "No such file"});
   expectRefused([] { PrtReader("/tmp"); }, {"a folder"});
 }

@@ -371,7 +371,7 @@ TEST(MoteInfo, RefusesWhatItCannotRead) {
   writeBytes(folder.file("fake.prt"), "no particles at all");
   writeBytes(folder.file("fake.exr"), "no picture at all");
   const std::pair<std::string, std::string> cases[] = {
-      {folder.file("notes.txt"), "a particle file (PRT 1.0 and 1.1, NPY, PLY"},
+      {folder.file("notes.txt"), "a particle file (PRT 1.0 and 1.1, PRT 2"},
       {folder.file("fake.prt"), "fake.prt"},
       {folder.file("fake.exr"), "fake.exr"},
       {folder.file("note.txt"), "nearest names in its folder: 'notes.txt'"},

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "host/core/error.h"
+#include "host/core/log.h"
 #include "host/particles/formats/particle_file.h"
 #include "tests/support/temp_folder.h"
 
@@ -47,6 +48,8 @@ inline void expectFileRefused(const std::string& bytes, const std::vector<std::s
 
 /// Opens and reads the file with each of its bits flipped: refused or read, but no more than `mostParticles`.
 inline void flipEveryBit(const std::string& whole, std::uint64_t mostParticles) {
+  std::vector<std::string> warnings;
+  const WarningsKept kept(warnings);
   for (std::size_t bit = 0; bit < 8 * whole.size(); ++bit) {
     std::string bytes = whole;
     bytes[bit / 8] = static_cast<char>(bytes[bit / 8] ^ 1 << bit % 8);

@@ -9,6 +9,7 @@
 #include "host/particles/formats/input_file.h"
 #include "host/particles/formats/npy_reader.h"
 #include "host/particles/formats/ply_reader.h"
+#include "host/particles/formats/prt2_reader.h"
 #include "host/particles/formats/prt_reader.h"
 
 namespace mote {
@@ -31,6 +32,7 @@ std::unique_ptr<ParticleFile> open(const std::string& path) {
 
 constexpr Format kFormats[] = {
     {"PRT 1.0 and 1.1", beginsAsPrt, open<PrtReader>},
+    {"PRT 2 and SPRT", beginsAsPrt2, open<Prt2Reader>},
     {"NPY", beginsAsNpy, open<NpyReader>},
     {"PLY", beginsAsPly, open<PlyReader>},
     {"CSV and other tables of numbers", beginsAsTable, open<CsvReader>},  // last: any text might be one

@@ -119,8 +119,8 @@ struct Block {
 }  // namespace
 
 bool beginsAsPrt(std::span<const std::byte> start) {
-  constexpr std::size_t kName = 4;  // PRT 2 goes on otherwise, and the reader says that it is that
-  return start.size() >= kName && std::memcmp(start.data(), kPrtMagic, kName) == 0;
+  constexpr std::size_t kName = 4;  // also of damaged ones
+  return start.size() > kName && std::memcmp(start.data(), kPrtMagic, kName) == 0 && start[kName] != std::byte{'2'};
 }
 
 PrtReader::PrtReader(std::string path) : ParticleFile(path), file_(std::move(path)) {

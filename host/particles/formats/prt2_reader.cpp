@@ -1,0 +1,346 @@
+#include "host/particles/formats/prt2_reader.h"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+#include <limits>
+#include <new>
+#include <optional>
+
+#include "host/core/error.h"
+#include "host/core/log.h"
+#include "host/particles/formats/channel_sink.h"
+#include "host/particles/formats/number_visit.h"
+
+namespace mote {
+namespace {
+
+constexpr unsigned char kMagic[8] = {0xC0, 'P', 'R', 'T', '2', '\r', '\n', 0x1A};
+constexpr std::uint32_t kVersion = 3;
+constexpr std::uint64_t kMostChannelBytes = 50000;  // as its makers' reader has it
+constexpr std::uint64_t kMostMetadataBytes = 1 << 20, kMostParticleBytes = 1 << 20;
+constexpr std::uint64_t kNotClosed = ~std::uint64_t{0};
+/// Deflate's best case, as in prt_reader.cpp.
+constexpr std::uint64_t kMaxExpansion = 1032;
+
+std::optional<NumberType> typeNamed(std::string_view name) {
+  for (std::int32_t k = 0; k < kNumberTypes; ++k)
+    if (numberName(static_cast<NumberType>(k)) == name) return static_cast<NumberType>(k);
+  return std::nullopt;
+}
+
+/// "float32" or "3 * float32".
+std::optional<std::pair<NumberType, std::uint32_t>> typeAndArity(std::string_view text) {
+  std::uint32_t arity = 1;
+  if (const std::size_t times = text.find(" * "); times != text.npos) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + times, arity);
+    if (error != std::errc() || end != text.data() + times || arity == 0) return std::nullopt;
+    text.remove_prefix(times + 3);
+  }
+  const std::optional<NumberType> type = typeNamed(text);
+  if (!type) return std::nullopt;
+  return std::pair(*type, arity);
+}
+
+std::string shown(std::string_view raw) {
+  std::string text;
+  for (const char c : raw.substr(0, 40)) text += c >= 32 && c < 127 ? c : '?';
+  return "'" + text + (raw.size() > 40 ? "…'" : "'");
+}
+
+void inflateAll(const std::string& path, std::span<const std::byte> from, std::span<std::byte> to,
+                std::uint64_t particle) {
+  uLongf size = to.size();
+  const int status =
+      uncompress(reinterpret_cast<Bytef*>(to.data()), &size, reinterpret_cast<const Bytef*>(from.data()), from.size());
+  if (status == Z_MEM_ERROR) throw MachineError(fmt::format("{}: zlib is out of memory", path));
+  if (status != Z_OK || size != to.size())
+    throw InputError(path, fmt::format("block at particle {}", particle),
+                     fmt::format("{} bytes of particles in valid zlib data", to.size()),
+                     status == Z_OK ? fmt::format("{} bytes", size) : "something else", "the file is damaged");
+}
+
+/// Byte k of particle j stands at j + k · count: back to one particle behind the other.
+void untranspose(std::span<const std::byte> from, std::size_t count, std::span<std::byte> to) {
+  const std::size_t size = count > 0 ? from.size() / count : 0;
+  for (std::size_t k = 0; k < size; ++k)
+    for (std::size_t j = 0; j < count; ++j) to[j * size + k] = from[k * count + j];
+}
+
+}  // namespace
+
+/// A chunk of the file that cannot be left.
+class Prt2Reader::Chunk {
+ public:
+  Chunk(const InputFile& file, std::string kind, std::uint64_t begin, std::uint64_t end)
+      : file_(file), kind_(std::move(kind)), at_(begin), end_(end) {
+    file_.seek(begin);
+  }
+  const std::string& kind() const { return kind_; }
+  std::uint64_t position() const { return at_; }
+  std::uint64_t end() const { return end_; }
+  std::uint64_t left() const { return end_ - at_; }
+  std::string what() const { return fmt::format("chunk {} at byte {}", shown(kind_), at_); }
+
+  std::string bytes(std::uint64_t count) {
+    if (count > left())
+      throw InputError(file_.path(), what(), fmt::format("{} bytes", count), fmt::format("only {}", left()),
+                       "the file is damaged");
+    std::string data(count, '\0');
+    if (file_.read(reinterpret_cast<std::byte*>(data.data()), count) != count)
+      throw InputError(file_.path(), what(), fmt::format("{} bytes", count), "the file's end", "the file is cut off");
+    at_ += count;
+    return data;
+  }
+  template <class T>
+  T number() {
+    T value;
+    std::memcpy(&value, bytes(sizeof(T)).data(), sizeof(T));
+    return value;
+  }
+  /// LEB128, at most ten bytes.
+  std::uint64_t varint() {
+    std::uint64_t value = 0;
+    for (int shift = 0; shift < 70; shift += 7) {
+      const auto byte = static_cast<unsigned char>(bytes(1)[0]);
+      if (shift == 63 && byte > 1) break;
+      value |= std::uint64_t{byte & 0x7fu} << shift;
+      if ((byte & 0x80) == 0) return value;
+    }
+    throw InputError(file_.path(), what(), "a number of at most ten bytes", "more", "the file is damaged");
+  }
+  std::string text() {
+    const std::uint64_t size = varint();
+    return bytes(size);
+  }
+
+ private:
+  const InputFile& file_;
+  std::string kind_;
+  std::uint64_t at_, end_;
+};
+
+bool beginsAsPrt2(std::span<const std::byte> start) {
+  return start.size() >= sizeof kMagic && std::memcmp(start.data(), kMagic, sizeof kMagic) == 0;
+}
+
+Prt2Reader::Prt2Reader(std::string path) : ParticleFile(path), file_(std::move(path)) {
+  Chunk start(file_, "magic number", 0, file_.bytes());
+  if (std::memcmp(start.bytes(sizeof kMagic).data(), kMagic, sizeof kMagic) != 0)
+    throw InputError(path_, "PRT 2 magic number", "\\xC0PRT2\\r\\n\\x1A", "something else");
+  if (const auto version = start.number<std::uint32_t>(); version != kVersion)
+    throw InputError(path_, "PRT 2 version", fmt::format("{}", kVersion), fmt::format("{}", version));
+  std::vector<Stream> streams;
+  std::vector<std::string> indexed;
+  for (std::uint64_t at = start.position(); at < file_.bytes();) {
+    Chunk head(file_, "a chunk's head", at, file_.bytes());
+    const std::string kind = head.bytes(4);
+    const auto size = head.number<std::uint64_t>();
+    if (size > head.left())
+      throw InputError(path_, fmt::format("chunk {} at byte {}", shown(kind), at),
+                       fmt::format("at most {} bytes", head.left()), fmt::format("{}", size),
+                       "the file is cut off or damaged");
+    Chunk chunk(file_, kind, head.position(), head.position() + size);
+    if ((kind == "Chan") != channels_.empty())
+      throw InputError(path_, fmt::format("chunk {} at byte {}", shown(kind), at), "'Chan' first, once", shown(kind));
+    if (kind == "Chan")
+      readChannels(chunk);
+    else if (kind == "Meta")
+      readMetadata(chunk);
+    else if (kind == "Part" || kind == "PrtO")
+      streams.push_back(readStream(chunk, kind == "PrtO"));
+    else if (kind == "PIdx")
+      checkIndex(chunk, streams, indexed);
+    at = chunk.end();
+  }
+  choose(streams, indexed);
+  format_ = stream_.name.empty() ? "PRT 2" : "SPRT, " + stream_.name;
+}
+
+void Prt2Reader::readChannels(Chunk& chunk) {
+  if (chunk.left() > kMostChannelBytes)
+    throw InputError(path_, chunk.what(), fmt::format("at most {} bytes", kMostChannelBytes),
+                     fmt::format("{}", chunk.left()));
+  const std::uint64_t count = chunk.varint();
+  for (std::uint64_t k = 0; k < count; ++k) {
+    const std::string name = chunk.text(), type = chunk.text();
+    const std::uint64_t size = chunk.varint();
+    const auto known = typeAndArity(type);
+    const std::string what = fmt::format("channel {}", shown(name));
+    if (!known) throw InputError(path_, what, "a type like float32 or 3 * float32", shown(type));
+    if (size != numberSize(known->first) * std::uint64_t{known->second})
+      throw InputError(path_, what,
+                       fmt::format("the {} bytes of {}", numberSize(known->first) * std::uint64_t{known->second}, type),
+                       fmt::format("{}", size));
+    if (name.empty() || channel(name)) throw InputError(path_, what, "a name that no other channel has", shown(name));
+    if (size > kMostParticleBytes - particleBytes_)
+      throw InputError(path_, what, fmt::format("at most {} bytes a particle", kMostParticleBytes), "more");
+    Channel one;
+    one.name = name, one.type = known->first, one.arity = known->second;
+    channels_.push_back(std::move(one));
+    offsets_.push_back(particleBytes_);
+    particleBytes_ += size;
+  }
+  if (channels_.empty()) throw InputError(path_, "chunk 'Chan'", "at least one channel", "none");
+}
+
+void Prt2Reader::readMetadata(Chunk& chunk) {
+  if (chunk.left() > kMostMetadataBytes) return logWarning(fmt::format("{}: left out {}", path_, chunk.what()));
+  std::string name = chunk.text();
+  const std::string type = chunk.text();
+  Metadata entry;
+  if (const std::size_t dot = name.find('.'); dot != name.npos && channel(name.substr(0, dot)))
+    entry.channel = name.substr(0, dot), name.erase(0, dot + 1);
+  entry.name = std::move(name);
+  if (meta(entry.channel, entry.name))
+    throw InputError(path_, chunk.what(), "metadata of different names", shown(entry.name));
+  if (type == "string") {
+    entry.bytes = chunk.bytes(chunk.left());
+    if (!entry.bytes.empty() && entry.bytes.back() == '\0') entry.bytes.pop_back();
+  } else if (const auto known = typeAndArity(type)) {
+    entry.type = static_cast<std::int32_t>(known->first);
+    entry.bytes = chunk.bytes(chunk.left());
+    if (entry.bytes.size() % numberSize(known->first) != 0)
+      throw InputError(path_, fmt::format("metadata {}", shown(entry.name)), "whole numbers of " + type,
+                       fmt::format("{} bytes", entry.bytes.size()));
+  } else {
+    return logWarning(fmt::format("{}: left out metadata {}, whose type is {}", path_, shown(entry.name), shown(type)));
+  }
+  metadata_.push_back(std::move(entry));
+}
+
+Prt2Reader::Stream Prt2Reader::readStream(Chunk& chunk, bool offsets) const {
+  Stream stream;
+  stream.name = chunk.text(), stream.compression = chunk.text();
+  stream.particles = chunk.number<std::uint64_t>(), stream.blocks = chunk.number<std::uint64_t>();
+  stream.begin = chunk.position(), stream.end = chunk.end();
+  stream.offsets = offsets;
+  const std::string& c = stream.compression;
+  stream.transposed = c.starts_with("transpose"), stream.deflated = c.ends_with("zlib");
+  if (c == "lz4" || c == "transpose-lz4")
+    throw InputError(path_, fmt::format("stream {}", shown(stream.name)), "zlib or no compression", shown(c),
+                     "Mote cannot read LZ4 yet");
+  if (c != "uncompressed" && c != "zlib" && c != "transpose" && c != "transpose-zlib")
+    throw InputError(path_, fmt::format("stream {}", shown(stream.name)),
+                     "uncompressed, zlib, transpose or transpose-zlib", shown(c));
+  if (stream.blocks == kNotClosed || stream.particles == kNotClosed)
+    throw InputError(path_, fmt::format("stream {}", shown(stream.name)), "a count of particles",
+                     "none: it was not closed", "whatever wrote it stopped before its end");
+  return stream;
+}
+
+/// An index has the size and the particles of each block: both must be what the stream says of itself.
+void Prt2Reader::checkIndex(Chunk& chunk, std::span<const Stream> streams, std::vector<std::string>& indexed) const {
+  const std::string name = chunk.text();
+  const auto stream = std::find_if(streams.begin(), streams.end(), [&](const Stream& s) { return s.name == name; });
+  if (stream == streams.end())
+    throw InputError(path_, "index", "one of a stream before it", shown(name), "the file is damaged");
+  const auto count = chunk.number<std::uint64_t>();
+  std::uint64_t bytes = 0, particles = 0;
+  for (std::uint64_t k = 0; k < count; ++k) {
+    const std::uint64_t size = chunk.varint(), here = chunk.varint();
+    if (size > stream->end - stream->begin - bytes || here > stream->particles - particles)
+      throw InputError(path_, fmt::format("index of stream {}", shown(name)), "blocks within the stream",
+                       fmt::format("more from block {} on", k), "the file is damaged");
+    bytes += size, particles += here;
+  }
+  if (count != stream->blocks || bytes != stream->end - stream->begin || particles != stream->particles)
+    throw InputError(path_, fmt::format("index of stream {}", shown(name)),
+                     fmt::format("{} blocks, {} bytes, {} particles", stream->blocks, stream->end - stream->begin,
+                                 stream->particles),
+                     fmt::format("{}, {}, {}", count, bytes, particles), "the file is cut off or damaged");
+  indexed.push_back(name);
+}
+
+void Prt2Reader::choose(std::span<const Stream> streams, std::span<const std::string> indexed) {
+  if (streams.empty())
+    throw InputError(path_, "", "a stream of particles (chunk 'Part' or 'PrtO')", "none",
+                     "the file is cut off, or whatever wrote it stopped before its end");
+  const Stream* best = &streams[0];
+  for (const Stream& stream : streams) {
+    if (std::find(indexed.begin(), indexed.end(), stream.name) == indexed.end())
+      throw InputError(path_, fmt::format("stream {}", shown(stream.name)), "an index (chunk 'PIdx')", "none",
+                       "the file is cut off, or whatever wrote it stopped before its end");
+    if (!best->name.empty() && (stream.name.empty() || stream.particles > best->particles)) best = &stream;
+  }
+  stream_ = *best;
+  count_ = stream_.particles;
+  const std::uint64_t bytes = stream_.end - stream_.begin, most = stream_.deflated ? bytes * kMaxExpansion : bytes;
+  if (count_ > most / particleBytes_)
+    throw InputError(path_, "particle count",
+                     fmt::format("at most {}, what {} bytes can hold", most / particleBytes_, bytes),
+                     fmt::format("{}", count_), "the file is damaged");
+  if (!stream_.offsets) return;
+  for (std::size_t k = 0; k < channels_.size(); ++k)
+    if (channels_[k].name == "Position" && channels_[k].arity == 3) {
+      position_ = k, storedPosition_ = channels_[k].type;
+      channels_[k].type = NumberType::F64;
+    }
+}
+
+void Prt2Reader::read(std::span<const ChannelRequest> requests) const {
+  std::vector<ChannelSink> sinks;
+  for (const ChannelRequest& request : requests) sinks.emplace_back(path_, channels_, request);
+  Chunk blocks(file_, "Part", stream_.begin, stream_.end);
+  std::uint64_t done = 0;
+  std::vector<std::byte> rows, turned;
+  std::vector<double> positions;
+  const auto fail = [&](const std::string& expected, const std::string& got) {
+    throw InputError(path_, fmt::format("block at particle {} of {}", done, count_), expected, got,
+                     "the file is damaged");
+  };
+  try {
+    for (ChannelSink& sink : sinks) sink.reserve(std::min<std::uint64_t>(count_, 1 << 20));
+    for (std::uint64_t block = 0; block < stream_.blocks; ++block) {
+      std::uint64_t bytes = blocks.number<std::uint32_t>();
+      const std::uint64_t here = blocks.number<std::uint32_t>();
+      if (here > count_ - done) fail(fmt::format("at most {} particles", count_ - done), fmt::format("{}", here));
+      float offset[3] = {};
+      if (stream_.offsets) {
+        if (bytes < sizeof offset) fail("an offset of 12 bytes", fmt::format("{}", bytes));
+        for (float& number : offset) number = blocks.number<float>();
+        bytes -= sizeof offset;
+      }
+      const std::uint64_t size = here * particleBytes_;
+      if (stream_.deflated ? size > bytes * kMaxExpansion : size != bytes)
+        fail(fmt::format("the bytes of {} particles", here), fmt::format("{}", bytes));
+      const std::string data = blocks.bytes(bytes);
+      const auto raw = std::as_bytes(std::span(data));
+      rows.resize(size);
+      if (stream_.deflated)
+        inflateAll(path_, raw, rows, done);
+      else
+        std::copy(raw.begin(), raw.end(), rows.begin());
+      if (stream_.transposed) {
+        turned.resize(size);
+        untranspose(rows, here, turned);
+        rows.swap(turned);
+      }
+      if (position_ < channels_.size()) {
+        positions.resize(3 * here);
+        withNumberType(storedPosition_, [&]<class T>(T) {
+          for (std::size_t i = 0; i < positions.size(); ++i) {
+            T number;
+            std::memcpy(&number, &rows[i / 3 * particleBytes_ + offsets_[position_] + i % 3 * sizeof(T)], sizeof(T));
+            positions[i] = static_cast<double>(number) + static_cast<double>(offset[i % 3]);
+          }
+        });
+      }
+      for (ChannelSink& sink : sinks)
+        if (sink.index() == position_)
+          sink.append(reinterpret_cast<const std::byte*>(positions.data()), 3 * sizeof(double), here);
+        else
+          sink.append(rows.data() + offsets_[sink.index()], particleBytes_, here);
+      done += here;
+    }
+    if (done != count_) fail(fmt::format("{} particles in all", count_), fmt::format("{}", done));
+  } catch (const std::bad_alloc&) {
+    throw MachineError(
+        fmt::format("{}: not enough memory for {} particles of {} bytes", path_, count_, particleBytes_));
+  }
+}
+
+}  // namespace mote
