@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -33,5 +34,40 @@ class InputFile {
   std::unique_ptr<std::FILE, Close> file_;
   std::uint64_t bytes_ = 0;
 };
+
+/// A file that may be packed with gzip, read as what was packed.
+class GzipFile {
+ public:
+  /// As InputFile's.
+  explicit GzipFile(std::string path);
+
+  const std::string& path() const { return path_; }
+  std::uint64_t bytes() const { return bytes_; }  ///< of the file as it is
+  bool packed() const { return packed_; }
+  /// What it can hold at most: its bytes, or what they could be unpacked to.
+  std::uint64_t mostBytes() const { return packed_ ? bytes_ * kMostExpansion : bytes_; }
+
+  /// Back to a place of what was packed: all before it is unpacked again.
+  void seek(std::uint64_t position) const;
+  /// As many as there are: fewer than `wanted` only at the end. Throws InputError where the packed data are damaged.
+  std::size_t read(std::byte* to, std::size_t wanted) const;
+
+  /// Deflate's best case: 258 bytes from two bits, less the heads of its blocks (zlib.net, "Maximum Compression
+  /// Factor").
+  static constexpr std::uint64_t kMostExpansion = 1032;
+
+ private:
+  struct Close {
+    void operator()(void* file) const;
+  };
+  std::string path_;
+  std::unique_ptr<void, Close> file_;  // zlib's
+  std::uint64_t bytes_ = 0;
+  bool packed_ = false;
+};
+
+/// Whether a file that begins so is packed with gzip, and the beginning of what was packed, at most `most` bytes.
+bool beginsAsGzip(std::span<const std::byte> start);
+std::vector<std::byte> unpackedStart(std::span<const std::byte> start, std::size_t most);
 
 }  // namespace mote

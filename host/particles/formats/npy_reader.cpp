@@ -294,7 +294,8 @@ void NpyReader::setChannels(const Dtype& dtype, std::span<const std::uint64_t> s
   } else {
     const std::uint64_t width = product(path_, shape.subspan(1), kMostRowBytes / rowBytes_);
     if (shape.size() > 2)
-      throw InputError(path_, "shape", "(N, columns), or an array with fields", fmt::format("{} numbers", shape.size()));
+      throw InputError(path_, "shape", "(N, columns), or an array with fields",
+                       fmt::format("{} numbers", shape.size()));
     placed_ = plainColumns(path_, width, dtype.columns[0].channel.type);
     rowBytes_ *= width;
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "host/core/error.h"
+#include "host/particles/formats/bgeo_reader.h"
 #include "host/particles/formats/csv_reader.h"
 #include "host/particles/formats/input_file.h"
 #include "host/particles/formats/npy_reader.h"
@@ -21,6 +22,7 @@ struct Format {
   /// Whether a file that begins so is of this format; at most kStart bytes are given.
   bool (*begins)(std::span<const std::byte> start);
   std::unique_ptr<ParticleFile> (*open)(const std::string& path);
+  bool packed = false;  ///< may be packed with gzip
 };
 
 constexpr std::size_t kStart = 1 << 16;
@@ -35,14 +37,23 @@ constexpr Format kFormats[] = {
     {"PRT 2 and SPRT", beginsAsPrt2, open<Prt2Reader>},
     {"NPY", beginsAsNpy, open<NpyReader>},
     {"PLY", beginsAsPly, open<PlyReader>},
+    {"classic BGEO", beginsAsBgeo, open<BgeoReader>, true},
     {"CSV and other tables of numbers", beginsAsTable, open<CsvReader>},  // last: any text might be one
 };
 
-const Format* formatOf(const std::string& path, bool& empty) {
-  const std::vector<std::byte> start = InputFile(path).start(kStart);
-  empty = start.empty();
+/// What a file begins with, unpacked.
+struct Start {
+  std::vector<std::byte> bytes;
+  bool packed = false;
+
+  explicit Start(const std::string& path) : bytes(InputFile(path).start(kStart)), packed(beginsAsGzip(bytes)) {
+    if (packed) bytes = unpackedStart(bytes, kStart);
+  }
+};
+
+const Format* formatOf(const Start& start) {
   for (const Format& format : kFormats)
-    if (format.begins(start)) return &format;
+    if (format.begins(start.bytes)) return &format;
   return nullptr;
 }
 
@@ -65,16 +76,16 @@ std::string particleFormats() {
   return names;
 }
 
-bool isParticleFile(const std::string& path) {
-  bool empty = false;
-  return formatOf(path, empty) != nullptr;
-}
+bool isParticleFile(const std::string& path) { return formatOf(Start(path)) != nullptr; }
 
 std::unique_ptr<ParticleFile> openParticleFile(const std::string& path) {
-  bool empty = false;
-  if (const Format* format = formatOf(path, empty)) return format->open(path);
+  const Start start(path);
+  const Format* format = formatOf(start);
+  if (format && (format->packed || !start.packed)) return format->open(path);
+  if (format)
+    throw InputError(path, "", fmt::format("{} as it is", format->name), "packed with gzip", "gunzip it first");
   throw InputError(path, "", fmt::format("a particle file in a format that Mote reads ({})", particleFormats()),
-                   empty ? "an empty file" : "none of them",
+                   start.bytes.empty() ? "an empty file" : "none of them",
                    "numpy.save('particles.npy', array) with the columns x, y, z makes one that it does");
 }
 

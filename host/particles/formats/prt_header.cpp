@@ -78,8 +78,7 @@ struct Parser {
   std::uint64_t parseFixed() {
     Section section(path, file, 0, fileBytes);
     const std::string magic = section.bytes(sizeof kPrtMagic, "PRT magic number");
-    if (magic.compare(0, 5, "\xC0PRT2") == 0)
-      fail("", "a PRT 1.0 or 1.1 file", "PRT 2");
+    if (magic.compare(0, 5, "\xC0PRT2") == 0) fail("", "a PRT 1.0 or 1.1 file", "PRT 2");
     if (std::memcmp(magic.data(), kPrtMagic, sizeof kPrtMagic) != 0)
       fail("", "a PRT file, which starts with the bytes C0 50 52 54 0D 0A 1A 0A", shown(magic),
            "is it another format, or was it sent as text?");
