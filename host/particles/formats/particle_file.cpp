@@ -12,6 +12,7 @@
 #include "host/particles/formats/ply_reader.h"
 #include "host/particles/formats/prt2_reader.h"
 #include "host/particles/formats/prt_reader.h"
+#include "host/particles/formats/vtk_reader.h"
 
 namespace mote {
 namespace {
@@ -37,6 +38,7 @@ constexpr Format kFormats[] = {
     {"PRT 2 and SPRT", beginsAsPrt2, open<Prt2Reader>},
     {"NPY", beginsAsNpy, open<NpyReader>},
     {"PLY", beginsAsPly, open<PlyReader>},
+    {"legacy VTK", beginsAsVtk, open<VtkReader>},
     {"classic BGEO", beginsAsBgeo, open<BgeoReader>, true},
     {"CSV and other tables of numbers", beginsAsTable, open<CsvReader>},  // last: any text might be one
 };

@@ -14,6 +14,7 @@
 #include "host/core/error.h"
 #include "host/core/log.h"
 #include "host/core/parallel.h"
+#include "host/particles/formats/byte_stream.h"
 #include "host/particles/formats/channel_sink.h"
 #include "host/particles/formats/number_visit.h"
 
@@ -37,43 +38,6 @@ std::optional<NumberType> typeNamed(const std::string& name) {
   return std::nullopt;
 }
 
-/// A file's bytes through a buffer.
-class Bytes {
- public:
-  Bytes(const InputFile& file, std::uint64_t from) : file_(file), at_(from) { file.seek(from); }
-
-  std::uint64_t position() const { return at_; }
-  /// −1 at the end.
-  int next() {
-    if (used_ == buffer_.size() && !refill()) return -1;
-    ++at_;
-    return static_cast<int>(buffer_[used_++]);
-  }
-  int peek() { return used_ == buffer_.size() && !refill() ? -1 : static_cast<int>(buffer_[used_]); }
-
- private:
-  bool refill() {
-    buffer_.resize(kBlockBytes);
-    buffer_.resize(file_.read(buffer_.data(), kBlockBytes));
-    used_ = 0;
-    return !buffer_.empty();
-  }
-  const InputFile& file_;
-  std::vector<std::byte> buffer_;
-  std::size_t used_ = 0;
-  std::uint64_t at_;
-};
-
-bool isSpace(int c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t'; }
-
-/// The next word of a text, at most `most` characters; empty at its end.
-std::string nextWord(Bytes& bytes, std::size_t most) {
-  while (isSpace(bytes.peek())) bytes.next();
-  std::string word;
-  while (word.size() < most && bytes.peek() >= 0 && !isSpace(bytes.peek())) word += static_cast<char>(bytes.next());
-  return word;
-}
-
 }  // namespace
 
 struct PlyReader::Property {
@@ -93,11 +57,12 @@ struct PlyReader::Element {
 };
 
 bool beginsAsPly(std::span<const std::byte> start) {
-  return start.size() >= 4 && std::memcmp(start.data(), "ply", 3) == 0 && isSpace(static_cast<int>(start[3]));
+  return start.size() >= 4 && std::memcmp(start.data(), "ply", 3) == 0 &&
+         ByteStream::isSpace(static_cast<int>(start[3]));
 }
 
 std::vector<PlyReader::Element> PlyReader::parseHeader() {
-  Bytes bytes(file_, 0);
+  ByteStream bytes(file_, 0);
   std::vector<Element> elements;
   std::size_t number = 0;
   bool hasFormat = false;
@@ -172,7 +137,7 @@ void PlyReader::skipElement(const Element& element) {
   // A row is at least a byte.
   if (!element.properties.empty() && element.count > left) cutOff();
   if (element.properties.empty()) return;
-  Bytes bytes(file_, dataBegin_);
+  ByteStream bytes(file_, dataBegin_);
   if (encoding_ == Encoding::Text) {
     for (std::uint64_t row = 0; row < element.count; ++row)
       for (int c = bytes.next(); c != '\n'; c = bytes.next())
@@ -325,12 +290,12 @@ void PlyReader::readText(std::vector<ChannelSink>& sinks) const {
   constexpr std::size_t kMostDigits = 64;
   const std::size_t perBlock = std::max<std::size_t>(1, kBlockBytes / rowBytes_);
   std::vector<std::byte> rows(perBlock * rowBytes_);
-  Bytes bytes(file_, dataBegin_);
+  ByteStream bytes(file_, dataBegin_);
   for (std::uint64_t first = 0; first < count_; first += perBlock) {
     const auto here = static_cast<std::size_t>(std::min<std::uint64_t>(perBlock, count_ - first));
     for (std::size_t i = 0; i < here; ++i)
       for (const PlacedChannel& column : columns_) {
-        const std::string word = nextWord(bytes, kMostDigits);
+        const std::string word = bytes.word(kMostDigits);
         const char* begin = word.data() + (word.starts_with('+') ? 1 : 0);
         double value = 0;
         const auto [end, error] = std::from_chars(begin, word.data() + word.size(), value);
