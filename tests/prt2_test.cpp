@@ -2,6 +2,7 @@
 #include "host/particles/formats/prt2_reader.h"
 
 #include <gtest/gtest.h>
+#include <lz4.h>
 #include <zlib.h>
 
 #include <cstring>
@@ -45,6 +46,14 @@ std::string deflated(const std::string& bytes) {
   out.resize(size);
   return out;
 }
+std::string lz4(const std::string& bytes) {
+  std::string out(static_cast<std::size_t>(LZ4_compressBound(static_cast<int>(bytes.size()))), '\0');
+  const int size =
+      LZ4_compress_default(bytes.data(), out.data(), static_cast<int>(bytes.size()), static_cast<int>(out.size()));
+  EXPECT_GT(size, 0);
+  out.resize(static_cast<std::size_t>(size));
+  return out;
+}
 std::string transposed(const std::string& rows, std::size_t count) {
   std::string out(rows.size(), '\0');
   const std::size_t size = rows.size() / count;
@@ -60,7 +69,7 @@ struct Prt2File {
   std::string channels =
       varint(2) + text("Position") + text("3 * float32") + varint(12) + text("ID") + text("uint16") + varint(2);
   std::string metadata = chunk("Meta", text("CoordSys") + text("int32") + rawNumbers<std::int32_t>({2})) +
-                         chunk("Meta", text("Position.Interpretation") + text("string") + "Point");
+                         chunk("Meta", text("Position.Interpretation") + text("string") + text("Point"));
   std::string stream, compression = "transpose-zlib", partKind = "Part";
   std::uint64_t particles = 3, blocks = 2;
   std::vector<std::string> rows{row(1, 10) + row(2, 20), row(3, 30)};
@@ -76,6 +85,7 @@ struct Prt2File {
       const std::size_t count = block.size() / 14;
       std::string data = compression.starts_with("transpose") ? transposed(block, count) : block;
       if (compression.ends_with("zlib")) data = deflated(data);
+      if (compression.ends_with("lz4")) data = lz4(data);
       if (partKind == "PrtO") data.insert(0, rawNumbers<float>({1000, 2000, 3000}));
       bytes += rawNumbers<std::uint32_t>({static_cast<std::uint32_t>(data.size()), static_cast<std::uint32_t>(count)});
       bytes += data;
@@ -94,7 +104,7 @@ struct Prt2File {
 };
 
 TEST(Prt2Reader, ReadsEveryCompression) {
-  for (const char* compression : {"uncompressed", "zlib", "transpose", "transpose-zlib"}) {
+  for (const char* compression : {"uncompressed", "zlib", "lz4", "transpose", "transpose-zlib", "transpose-lz4"}) {
     Prt2File file;
     file.compression = compression;
     const OpenedFile opened(file.bytes());
@@ -170,6 +180,8 @@ TEST(Prt2Reader, SurvivesEveryFlippedBit) {
   Prt2File offsets;
   offsets.partKind = "PrtO", offsets.compression = "uncompressed";
   flipEveryBit(offsets.bytes(), 3);
+  offsets.compression = "lz4";
+  flipEveryBit(offsets.bytes(), 3000);
 }
 
 TEST(Prt2Reader, SaysWhatIsWrong) {
@@ -179,7 +191,6 @@ TEST(Prt2Reader, SaysWhatIsWrong) {
     return file.bytes();
   };
   expectFileRefused(spoiled([](Prt2File& f) { f.version = 4; }), {"version", "4"});
-  expectFileRefused(spoiled([](Prt2File& f) { f.compression = "lz4"; }), {"cannot read LZ4 yet"});
   expectFileRefused(spoiled([](Prt2File& f) { f.compression = "zip"; }), {"transpose-zlib", "'zip'"});
   expectFileRefused(spoiled([](Prt2File& f) { f.blocks = ~0ull; }), {"not closed"});
   expectFileRefused(spoiled([](Prt2File& f) { f.index = false; }), {"an index", "PIdx"});

@@ -1,6 +1,7 @@
 #include "host/particles/formats/prt2_reader.h"
 
 #include <fmt/format.h>
+#include <lz4.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -23,8 +24,10 @@ constexpr std::uint32_t kVersion = 3;
 constexpr std::uint64_t kMostChannelBytes = 50000;  // as its makers' reader has it
 constexpr std::uint64_t kMostMetadataBytes = 1 << 20, kMostParticleBytes = 1 << 20;
 constexpr std::uint64_t kNotClosed = ~std::uint64_t{0};
-/// Deflate's best case, as in prt_reader.cpp.
+/// Deflate's best case, as in prt_reader.cpp; LZ4's is 255.
 constexpr std::uint64_t kMaxExpansion = 1032;
+/// LZ4 counts in int.
+constexpr std::uint64_t kMostBlockBytes = std::uint64_t{1} << 30;
 
 std::optional<NumberType> typeNamed(std::string_view name) {
   for (std::int32_t k = 0; k < kNumberTypes; ++k)
@@ -32,13 +35,14 @@ std::optional<NumberType> typeNamed(std::string_view name) {
   return std::nullopt;
 }
 
-/// "float32" or "3 * float32".
-std::optional<std::pair<NumberType, std::uint32_t>> typeAndArity(std::string_view text) {
+/// "float32" or "3 * float32", with any blanks.
+std::optional<std::pair<NumberType, std::uint32_t>> typeAndArity(std::string text) {
+  std::erase(text, ' ');
   std::uint32_t arity = 1;
-  if (const std::size_t times = text.find(" * "); times != text.npos) {
+  if (const std::size_t times = text.find('*'); times != text.npos) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + times, arity);
     if (error != std::errc() || end != text.data() + times || arity == 0) return std::nullopt;
-    text.remove_prefix(times + 3);
+    text.erase(0, times + 1);
   }
   const std::optional<NumberType> type = typeNamed(text);
   if (!type) return std::nullopt;
@@ -51,16 +55,25 @@ std::string shown(std::string_view raw) {
   return "'" + text + (raw.size() > 40 ? "…'" : "'");
 }
 
-void inflateAll(const std::string& path, std::span<const std::byte> from, std::span<std::byte> to,
-                std::uint64_t particle) {
-  uLongf size = to.size();
-  const int status =
-      uncompress(reinterpret_cast<Bytef*>(to.data()), &size, reinterpret_cast<const Bytef*>(from.data()), from.size());
-  if (status == Z_MEM_ERROR) throw MachineError(fmt::format("{}: zlib is out of memory", path));
-  if (status != Z_OK || size != to.size())
+/// Unpacks a block into `to`, which it must fill.
+void unpack(const std::string& path, bool lz4, std::span<const std::byte> from, std::span<std::byte> to,
+            std::uint64_t particle) {
+  std::uint64_t size = 0;
+  if (lz4) {
+    const int got = LZ4_decompress_safe(reinterpret_cast<const char*>(from.data()), reinterpret_cast<char*>(to.data()),
+                                        static_cast<int>(from.size()), static_cast<int>(to.size()));
+    size = got < 0 ? 0 : static_cast<std::uint64_t>(got);
+  } else {
+    uLongf got = to.size();
+    const int status =
+        uncompress(reinterpret_cast<Bytef*>(to.data()), &got, reinterpret_cast<const Bytef*>(from.data()), from.size());
+    if (status == Z_MEM_ERROR) throw MachineError(fmt::format("{}: zlib is out of memory", path));
+    size = status == Z_OK ? got : 0;
+  }
+  if (size != to.size())
     throw InputError(path, fmt::format("block at particle {}", particle),
-                     fmt::format("{} bytes of particles in valid zlib data", to.size()),
-                     status == Z_OK ? fmt::format("{} bytes", size) : "something else", "the file is damaged");
+                     fmt::format("{} bytes of particles in valid {} data", to.size(), lz4 ? "LZ4" : "zlib"),
+                     size > 0 ? fmt::format("{} bytes", size) : "something else", "the file is damaged");
 }
 
 /// Byte k of particle j stands at j + k · count: back to one particle behind the other.
@@ -198,8 +211,7 @@ void Prt2Reader::readMetadata(Chunk& chunk) {
   if (meta(entry.channel, entry.name))
     throw InputError(path_, chunk.what(), "metadata of different names", shown(entry.name));
   if (type == "string") {
-    entry.bytes = chunk.bytes(chunk.left());
-    if (!entry.bytes.empty() && entry.bytes.back() == '\0') entry.bytes.pop_back();
+    entry.bytes = chunk.text();
   } else if (const auto known = typeAndArity(type)) {
     entry.type = static_cast<std::int32_t>(known->first);
     entry.bytes = chunk.bytes(chunk.left());
@@ -219,13 +231,11 @@ Prt2Reader::Stream Prt2Reader::readStream(Chunk& chunk, bool offsets) const {
   stream.begin = chunk.position(), stream.end = chunk.end();
   stream.offsets = offsets;
   const std::string& c = stream.compression;
-  stream.transposed = c.starts_with("transpose"), stream.deflated = c.ends_with("zlib");
-  if (c == "lz4" || c == "transpose-lz4")
-    throw InputError(path_, fmt::format("stream {}", shown(stream.name)), "zlib or no compression", shown(c),
-                     "Mote cannot read LZ4 yet");
-  if (c != "uncompressed" && c != "zlib" && c != "transpose" && c != "transpose-zlib")
+  const std::string packing = c.starts_with("transpose-") ? c.substr(10) : c;
+  stream.transposed = c.starts_with("transpose"), stream.deflated = packing == "zlib", stream.lz4 = packing == "lz4";
+  if (!stream.packed() && c != "uncompressed" && c != "transpose")
     throw InputError(path_, fmt::format("stream {}", shown(stream.name)),
-                     "uncompressed, zlib, transpose or transpose-zlib", shown(c));
+                     "uncompressed, zlib, lz4, transpose, transpose-zlib or transpose-lz4", shown(c));
   if (stream.blocks == kNotClosed || stream.particles == kNotClosed)
     throw InputError(path_, fmt::format("stream {}", shown(stream.name)), "a count of particles",
                      "none: it was not closed", "whatever wrote it stopped before its end");
@@ -268,7 +278,7 @@ void Prt2Reader::choose(std::span<const Stream> streams, std::span<const std::st
   }
   stream_ = *best;
   count_ = stream_.particles;
-  const std::uint64_t bytes = stream_.end - stream_.begin, most = stream_.deflated ? bytes * kMaxExpansion : bytes;
+  const std::uint64_t bytes = stream_.end - stream_.begin, most = stream_.packed() ? bytes * kMaxExpansion : bytes;
   if (count_ > most / particleBytes_)
     throw InputError(path_, "particle count",
                      fmt::format("at most {}, what {} bytes can hold", most / particleBytes_, bytes),
@@ -305,13 +315,14 @@ void Prt2Reader::read(std::span<const ChannelRequest> requests) const {
         bytes -= sizeof offset;
       }
       const std::uint64_t size = here * particleBytes_;
-      if (stream_.deflated ? size > bytes * kMaxExpansion : size != bytes)
+      if (stream_.packed() ? size > std::min(bytes * kMaxExpansion, kMostBlockBytes) : size != bytes)
         fail(fmt::format("the bytes of {} particles", here), fmt::format("{}", bytes));
       const std::string data = blocks.bytes(bytes);
       const auto raw = std::as_bytes(std::span(data));
       rows.resize(size);
-      if (stream_.deflated)
-        inflateAll(path_, raw, rows, done);
+      if (here == 0) continue;
+      if (stream_.packed())
+        unpack(path_, stream_.lz4, raw, rows, done);
       else
         std::copy(raw.begin(), raw.end(), rows.begin());
       if (stream_.transposed) {
