@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <glm/gtc/quaternion.hpp>
@@ -243,25 +244,45 @@ TEST(LightGrid, ParticlesFarApartInDepthCostNoMemoryBetween) {
   EXPECT_LT(meanDifference(exact, found), 0.01);
 }
 
+/// Mean |ΔT| of grids of 1, ½ and ¼ radii.
+std::array<double, 3> errorsOfFinerGrids(const Octree& tree, const Receivers& receivers, const layout::Light& light) {
+  const double distance = light.type == layout::kLightPoint && light.position.y > 1 ? std::sqrt(14.0) : 1;
+  const std::vector<float> exact = transmittances(opticalDepths(tree, receivers, light, {.cutoff = 0}), light);
+  std::array<double, 3> errors{};
+  for (std::size_t k = 0; k < errors.size(); ++k) {
+    const double length = std::pow(0.5, static_cast<double>(k)) * tree.meanRadius;
+    errors[k] = meanDifference(
+        exact,
+        transmittances(gridOpticalDepths(tree, receivers, light, {.cutoff = 0}, {length / distance, length}), light));
+    std::printf("light %u, cells of %.2f radii: mean |dT| %.1e\n", light.type, length / tree.meanRadius, errors[k]);
+  }
+  return errors;
+}
+
 TEST(LightGrid, ConvergesToTheExactSumAsItBecomesFiner) {
   const Octree tree = noiseCloud(30000, 2).tree(3);
-  for (const layout::Light& light :
-       {pointLight({2, 3, 1}), pointLight({0.1f, 0, 0.1f}), directionalLight({1, -1, 0.3f})}) {
-    const double distance = light.type == layout::kLightPoint && light.position.y > 1 ? std::sqrt(14.0) : 1;
-    const std::vector<float> exact = transmittances(opticalDepths(tree, light, {.cutoff = 0}), light);
-    // The share of a particle before a start is taken as the mean over its kernel, not ray by ray: that is left.
-    constexpr double kLeft = 6e-4;
-    double last = 1;
-    for (const double cell : {1.0, 0.5, 0.25}) {
-      const double length = cell * tree.meanRadius;
-      const double error = meanDifference(
-          exact, transmittances(
-                     gridOpticalDepths(tree, slotsOf(tree), light, {.cutoff = 0}, {length / distance, length}), light));
-      EXPECT_LT(error, std::max(0.6 * last, kLeft)) << cell;
-      last = error;
-    }
-    std::printf("light grid of a quarter radius: mean |dT| %.1e\n", last);
-    EXPECT_LE(last, 1.5e-3);
+  // Light and receivers out of the cloud, so that every particle lies wholly in a ray's way or beside it.
+  std::vector<float> x, y, z;
+  for (std::size_t i = 0; i < 8000; ++i) {
+    const dvec3 place = 6.0 * Random(8, i).direction();
+    x.push_back(static_cast<float>(place.x)), y.push_back(static_cast<float>(place.y));
+    z.push_back(static_cast<float>(place.z));
+  }
+  const std::vector<std::uint32_t> none(x.size(), kNoSlot);
+  const layout::Light outside = pointLight({2, 3, 1}), inside = pointLight({0.1f, 0, 0.1f}),
+                      sun = directionalLight({1, -1, 0.3f});
+  for (const layout::Light& light : {outside, sun}) {
+    const std::array<double, 3> errors = errorsOfFinerGrids(tree, {x, y, z, none}, light);
+    EXPECT_GT(errors[0], 0);
+    for (std::size_t k = 1; k < errors.size(); ++k) EXPECT_LT(errors[k], 0.6 * errors[k - 1]);
+  }
+  // Among the particles the share of one before a start is taken as the mean over its kernel, not ray by ray: that is
+  // left. With the light inside of the cloud, rays are short, and half a radius reaches it.
+  for (const layout::Light& light : {outside, inside, sun}) {
+    const std::array<double, 3> errors = errorsOfFinerGrids(tree, slotsOf(tree), light);
+    EXPECT_LT(errors[1], 0.6 * errors[0]);
+    EXPECT_LT(errors[2], light.type == inside.type && light.position == inside.position ? 5.5e-4 : 0.6 * errors[1]);
+    EXPECT_LE(errors[2], 1.5e-3);
   }
 }
 
