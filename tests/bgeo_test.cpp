@@ -6,16 +6,12 @@
 
 #include "host/particles/particle_loader.h"
 #include "tests/support/opened_file.h"
+#include "tests/support/shared_data.h"
 
 namespace mote {
 namespace {
 
-using test::expectFileRefused;
-using test::flipEveryBit;
-using test::OpenedFile;
-using test::rawNumbers;
-
-std::string sharedFile(const std::string& name) { return std::string(MOTE_SHARED_DATA) + "/" + name; }
+using namespace test;
 
 std::string text(const std::string& value) {
   std::string bytes = rawNumbers<std::uint16_t>({static_cast<std::uint16_t>(value.size())}, true);
@@ -99,8 +95,8 @@ TEST(BgeoReader, RefusesTruncationAtEveryByte) {
 }
 
 TEST(BgeoReader, SurvivesEveryFlippedBit) {
-  flipEveryBit(bgeo(), 100);
-  flipEveryBit(gzipped(bgeo()), 100000);
+  expectEveryFlippedBitSurvived(bgeo(), 100);
+  expectEveryFlippedBitSurvived(gzipped(bgeo()), 100000);
 }
 
 TEST(BgeoReader, SaysWhatIsWrong) {

@@ -7,15 +7,12 @@
 
 #include "host/particles/particle_loader.h"
 #include "tests/support/opened_file.h"
+#include "tests/support/shared_data.h"
 
 namespace mote {
 namespace {
 
-using test::expectFileRefused;
-using test::flipEveryBit;
-using test::OpenedFile;
-
-std::string sharedFile(const std::string& name) { return std::string(MOTE_SHARED_DATA) + "/csv/" + name; }
+using namespace test;
 
 TEST(CsvReader, ReadsColumnsHoweverTheyAreParted) {
   for (const char* table :
@@ -39,7 +36,7 @@ TEST(CsvReader, TakesNamesAndTypesFromAHeader) {
 }
 
 TEST(CsvReader, ReadsTheFilesOfKrakatoasMakers) {
-  const std::unique_ptr<ParticleFile> halves = openParticleFile(sharedFile("float16.csv"));
+  const std::unique_ptr<ParticleFile> halves = openParticleFile(sharedFile("csv/float16.csv"));
   EXPECT_EQ(halves->count(), 9u);
   EXPECT_EQ(describeChannels(halves->channels()), "Position (3 × float16)");
   std::vector<vec3> position;
@@ -50,20 +47,20 @@ TEST(CsvReader, ReadsTheFilesOfKrakatoasMakers) {
 
   std::vector<dvec3> far;
   std::vector<vec3> color;
-  const std::unique_ptr<ParticleFile> offset = openParticleFile(sharedFile("singleplusoffset.csv"));
+  const std::unique_ptr<ParticleFile> offset = openParticleFile(sharedFile("csv/singleplusoffset.csv"));
   const ChannelRequest requests[] = {{"Position", &far}, {"Color", &color}};
   offset->read(requests);
   EXPECT_EQ(far[2], dvec3(100000010, 600, 401000002));
   EXPECT_EQ(color[4], vec3(0, 0, 0.0001f));
 
   ParticleSource source;
-  source.file = sharedFile("hdri_colors.csv");
+  source.file = sharedFile("csv/hdri_colors.csv");
   source.radius = {RadiusRule::Kind::Number};
   source.radius.value = 0.1f;
   const ParticleSet set = loadParticles({source}, 1);
   ASSERT_EQ(set.size(), 4u);
   EXPECT_EQ(set.color[0], vec3(5, 3, 1));
-  EXPECT_THROW(openParticleFile(sharedFile("malicious_whitespace_after_quote.csv")), InputError);
+  EXPECT_THROW(openParticleFile(sharedFile("csv/malicious_whitespace_after_quote.csv")), InputError);
 }
 
 TEST(CsvReader, NamesLineAndColumnOfWhatIsWrong) {
@@ -83,7 +80,7 @@ TEST(CsvReader, LeavesOtherTextsAlone) {
     expectFileRefused(text, {"a format that Mote reads", "CSV"});
 }
 
-TEST(CsvReader, SurvivesEveryFlippedBit) { flipEveryBit("x y z ID\n1 2 3 10\n4 5 6 20\n", 4); }
+TEST(CsvReader, SurvivesEveryFlippedBit) { expectEveryFlippedBitSurvived("x y z ID\n1 2 3 10\n4 5 6 20\n", 4); }
 
 TEST(CsvReader, ReadsLinesThatCrossTheEndsOfItsBuffer) {
   std::string table;

@@ -6,14 +6,12 @@
 #include "host/core/log.h"
 #include "host/particles/particle_loader.h"
 #include "tests/support/opened_file.h"
+#include "tests/support/shared_data.h"
 
 namespace mote {
 namespace {
 
-using test::expectFileRefused;
-using test::flipEveryBit;
-using test::OpenedFile;
-using test::rawNumbers;
+using namespace test;
 
 std::string npy(const std::string& dictionary, const std::string& data, int major = 1) {
   std::string header = dictionary + "\n";
@@ -88,7 +86,7 @@ TEST(NpyReader, MakesVectorsOfScalarsThatAreNamedAsOne) {
 
 TEST(NpyReader, ReadsARealFileThroughTheLoader) {
   ParticleSource source;
-  source.file = std::string(MOTE_SHARED_DATA) + "/npy/halo_low_res.npy";
+  source.file = sharedFile("npy/halo_low_res.npy");
   const ParticleSet set = loadParticles({source}, 1);
   ASSERT_EQ(set.size(), 32314u);
   const Bounds bounds = set.bounds();  // as its PROVENANCE has them
@@ -106,7 +104,7 @@ TEST(NpyReader, RefusesTruncationAtEveryByte) {
 }
 
 TEST(NpyReader, SurvivesEveryFlippedBit) {
-  flipEveryBit(npy(dictionary("[('x', '<f4'), ('y', '<f4'), ('z', '<f4')]", "(2,)"), kTwo), 24);
+  expectEveryFlippedBitSurvived(npy(dictionary("[('x', '<f4'), ('y', '<f4'), ('z', '<f4')]", "(2,)"), kTwo), 24);
 }
 
 TEST(NpyReader, RefusesHostileNumbersWithoutAllocating) {

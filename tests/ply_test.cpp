@@ -9,14 +9,12 @@
 #include "host/core/log.h"
 #include "host/particles/particle_loader.h"
 #include "tests/support/opened_file.h"
+#include "tests/support/shared_data.h"
 
 namespace mote {
 namespace {
 
-using test::expectFileRefused;
-using test::flipEveryBit;
-using test::OpenedFile;
-using test::rawNumbers;
+using namespace test;
 
 std::string ply(const std::string& format, const std::string& elements, const std::string& data) {
   std::string file = "ply\nformat ";
@@ -70,7 +68,7 @@ TEST(PlyReader, ReadsTextAndBothByteOrdersBehindAnyElement) {
 
 TEST(PlyReader, ReadsRealFilesThroughTheLoader) {
   ParticleSource source;
-  source.file = std::string(MOTE_SHARED_DATA) + "/ply/horse.ply";
+  source.file = sharedFile("ply/horse.ply");
   const ParticleSet set = loadParticles({source}, 1);
   ASSERT_EQ(set.size(), 48485u);
   EXPECT_EQ(set.color.size(), set.size());
@@ -101,7 +99,7 @@ TEST(PlyReader, GivesGaussianSplatsARadiusADensityAndAColour) {
   EXPECT_EQ(color[0].z, 0.0f);
 
   ParticleSource source;
-  source.file = std::string(MOTE_SHARED_DATA) + "/ply/train-1000.ply";
+  source.file = sharedFile("ply/train-1000.ply");
   const ParticleSet set = loadParticles({source}, 1);
   ASSERT_EQ(set.size(), 1000u);
   EXPECT_EQ(set.color.size(), 1000u);
@@ -120,8 +118,8 @@ TEST(PlyReader, RefusesTruncationAtEveryByteOfTheVertices) {
 }
 
 TEST(PlyReader, SurvivesEveryFlippedBit) {
-  flipEveryBit(ply("binary_little_endian", kFaces + kVertices, faces(false) + vertices(false)), 46);
-  flipEveryBit(ply("ascii", kVertices, "1 2 3 0.5 255 0 51\n4 5 6 0.25 0 255 0\n"), 46);
+  expectEveryFlippedBitSurvived(ply("binary_little_endian", kFaces + kVertices, faces(false) + vertices(false)), 46);
+  expectEveryFlippedBitSurvived(ply("ascii", kVertices, "1 2 3 0.5 255 0 51\n4 5 6 0.25 0 255 0\n"), 46);
 }
 
 TEST(PlyReader, RefusesHostileCountsWithoutAllocating) {

@@ -10,16 +10,12 @@
 #include "host/core/log.h"
 #include "host/particles/particle_loader.h"
 #include "tests/support/opened_file.h"
+#include "tests/support/shared_data.h"
 
 namespace mote {
 namespace {
 
-using test::expectFileRefused;
-using test::flipEveryBit;
-using test::OpenedFile;
-using test::rawNumbers;
-
-std::string sharedFile(const std::string& name) { return std::string(MOTE_SHARED_DATA) + "/prt/" + name; }
+using namespace test;
 
 std::string varint(std::uint64_t value) {
   std::string bytes;
@@ -143,7 +139,7 @@ TEST(Prt2Reader, ReadsTheStreamWithMostParticles) {
 }
 
 TEST(Prt2Reader, ReadsTheMakersOwnFiles) {
-  const std::unique_ptr<ParticleFile> normals = openParticleFile(sharedFile("wnormals.prt"));
+  const std::unique_ptr<ParticleFile> normals = openParticleFile(sharedFile("prt/wnormals.prt"));
   EXPECT_EQ(describeChannels(normals->channels()),
             "Position (3 × float32), Color (3 × float32), Normal (3 × float32), Intensity (float32)");
   std::vector<vec3> position;
@@ -153,7 +149,7 @@ TEST(Prt2Reader, ReadsTheMakersOwnFiles) {
   EXPECT_EQ(position.front(), vec3(1, 1.1f, 1.2f));
   EXPECT_EQ(position.back(), vec3(10, 10.1f, 10.2f));
 
-  const std::unique_ptr<ParticleFile> doubles = openParticleFile(sharedFile("doubleFloat.prt"));
+  const std::unique_ptr<ParticleFile> doubles = openParticleFile(sharedFile("prt/doubleFloat.prt"));
   std::vector<dvec3> far;
   const ChannelRequest farRequest{"Position", &far};
   doubles->read({&farRequest, 1});
@@ -166,7 +162,7 @@ TEST(Prt2Reader, ReadsTheMakersOwnFiles) {
   EXPECT_NEAR(far.back().z, 1.02e15, 1);
 
   ParticleSource source;
-  source.file = sharedFile("noNormals.prt");
+  source.file = sharedFile("prt/noNormals.prt");
   EXPECT_EQ(loadParticles({source}, 1).size(), 10u);
 }
 
@@ -176,12 +172,12 @@ TEST(Prt2Reader, RefusesTruncationAtEveryByte) {
 }
 
 TEST(Prt2Reader, SurvivesEveryFlippedBit) {
-  flipEveryBit(Prt2File{}.bytes(), 3000);
+  expectEveryFlippedBitSurvived(Prt2File{}.bytes(), 3000);
   Prt2File offsets;
   offsets.partKind = "PrtO", offsets.compression = "uncompressed";
-  flipEveryBit(offsets.bytes(), 3);
+  expectEveryFlippedBitSurvived(offsets.bytes(), 3);
   offsets.compression = "lz4";
-  flipEveryBit(offsets.bytes(), 3000);
+  expectEveryFlippedBitSurvived(offsets.bytes(), 3000);
 }
 
 TEST(Prt2Reader, SaysWhatIsWrong) {

@@ -20,12 +20,14 @@
 #include "host/core/parallel.h"
 #include "host/particles/formats/prt_reader.h"
 #include "host/particles/formats/prt_writer.h"
+#include "tests/support/shared_data.h"
 #include "tests/support/temp_folder.h"
 
 namespace mote {
 namespace {
 
 using test::readBytes;
+using test::sharedFile;
 using test::TempFolder;
 using test::writeBytes;
 
@@ -119,8 +121,6 @@ void expectRefused(const std::function<void()>& action, const std::vector<std::s
 void expectRefused(const PrtFile& file, const std::vector<std::string>& words) {
   expectRefused([&] { positionsOf(file.bytes()); }, words);
 }
-
-std::string sharedFile(const std::string& name) { return std::string(MOTE_SHARED_DATA) + "/" + name; }
 
 bool warned(const std::string& word) {
   for (const std::string& line : takeWarnings())

@@ -5,16 +5,12 @@
 
 #include "host/particles/particle_loader.h"
 #include "tests/support/opened_file.h"
+#include "tests/support/shared_data.h"
 
 namespace mote {
 namespace {
 
-using test::expectFileRefused;
-using test::flipEveryBit;
-using test::OpenedFile;
-using test::rawNumbers;
-
-std::string sharedFile(const std::string& name) { return std::string(MOTE_SHARED_DATA) + "/sph/" + name; }
+using namespace test;
 
 std::string vtk(const std::string& encoding, const std::string& body, const std::string& version = "3.0") {
   std::string file = "# vtk DataFile Version ";
@@ -74,11 +70,11 @@ TEST(VtkReader, StepsOverTheCellsOfVersion5) {
 
 TEST(VtkReader, ReadsFilesOfSimulationsThroughTheLoader) {
   ParticleSource source;
-  source.file = sharedFile("cube_8_particles.vtk");
+  source.file = sharedFile("sph/cube_8_particles.vtk");
   const ParticleSet cube = loadParticles({source}, 1);
   ASSERT_EQ(cube.size(), 8u);
   EXPECT_NEAR(cube.bounds().lo.y, 0.4995095, 1e-7);
-  source.file = sharedFile("bunny_frame_14_7705_particles.vtk");
+  source.file = sharedFile("sph/bunny_frame_14_7705_particles.vtk");
   const ParticleSet bunny = loadParticles({source}, 1);
   ASSERT_EQ(bunny.size(), 7706u);  // bounds as its PROVENANCE has them
   EXPECT_NEAR(bunny.bounds().lo.x, -0.60871, 1e-5);
@@ -103,8 +99,8 @@ TEST(VtkReader, RefusesTruncation) {
 }
 
 TEST(VtkReader, SurvivesEveryFlippedBit) {
-  flipEveryBit(binary(), 100);
-  flipEveryBit(vtk("ASCII", kText), 100);
+  expectEveryFlippedBitSurvived(binary(), 100);
+  expectEveryFlippedBitSurvived(vtk("ASCII", kText), 100);
 }
 
 TEST(VtkReader, SaysWhatIsWrong) {

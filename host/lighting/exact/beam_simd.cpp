@@ -12,6 +12,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/cache_control.h>
 #include <hwy/highway.h>
+#include "host/lighting/exact/cap-inl.h"
 #include "host/lighting/falloff-inl.h"
 // clang-format on
 
@@ -235,18 +236,11 @@ void choose(const Column& column, std::size_t channels, Beam& beam) {
 
 // ---- sum
 
-HWY_INLINE Vec capOf(Vec t, Vec halfChord) {
-  const Vec x = hn::Min(hn::Max(hn::Div(t, hn::Max(halfChord, hn::Set(kTag, 1e-30f))), hn::Set(kTag, -1.0f)),
-                        hn::Set(kTag, 1.0f));
-  const Vec inner = hn::Sub(hn::Set(kTag, 0.75f), hn::Mul(hn::Set(kTag, 0.25f), hn::Mul(x, x)));
-  return hn::Add(hn::Set(kTag, 0.5f), hn::Mul(x, inner));
-}
-
 template <layout::uint kFalloff>
 HWY_INLINE Vec softShare(Vec q, Vec t, float radius, float inverseRadius) {
   const Vec s = hn::Sqrt(hn::Max(hn::Sub(hn::Set(kTag, 1.0f), q), hn::Zero(kTag)));
   if constexpr (kFalloff != layout::kFalloffSmooth) {
-    return hn::Mul(falloffOf<kFalloff>(kTag, q), capOf(t, hn::Mul(hn::Set(kTag, radius), s)));
+    return hn::Mul(falloffOf<kFalloff>(kTag, q), capOf(kTag, t, hn::Mul(hn::Set(kTag, radius), s)));
   } else {
     const Vec x = hn::Min(hn::Max(hn::Mul(t, hn::Set(kTag, inverseRadius)), hn::Sub(hn::Zero(kTag), s)), s);
     const Vec sum = hn::Add(s, x);
@@ -366,7 +360,8 @@ class PacketSum {
       if constexpr (kEndpoint == layout::kEndpointSoft) {
         const Vec halfChord =
             hn::Mul(hn::Set(kTag, radius), hn::Sqrt(hn::Max(hn::Sub(hn::Set(kTag, 1.0f), q), hn::Zero(kTag))));
-        share = hn::Mul(hn::Mul(share, capOf(hn::Sub(length, fromLight), halfChord)), capOf(fromLight, halfChord));
+        share = hn::Mul(hn::Mul(share, capOf(kTag, hn::Sub(length, fromLight), halfChord)),
+                        capOf(kTag, fromLight, halfChord));
       }
       addShare(v, column_.gathered.peak, index, notSelf(v, slot, share));
     }

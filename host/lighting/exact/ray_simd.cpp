@@ -13,6 +13,7 @@
 // clang-format off
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include "host/lighting/exact/cap-inl.h"
 #include "host/lighting/falloff-inl.h"
 // clang-format on
 
@@ -34,12 +35,6 @@ constexpr Narrow kNarrow;
 constexpr int kWideLanes = static_cast<int>(hn::MaxLanes(Wide()));
 
 HWY_INLINE Vec set(float x) { return hn::Set(kTag, x); }
-
-/// host/core/cap.h
-HWY_INLINE Vec capOf(Vec t, Vec halfChord) {
-  const Vec x = hn::Min(hn::Max(hn::Div(t, hn::Max(halfChord, set(1e-30f))), set(-1.0f)), set(1.0f));
-  return hn::Add(set(0.5f), hn::Mul(x, hn::Sub(set(0.75f), hn::Mul(set(0.25f), hn::Mul(x, x)))));
-}
 
 /// Which boxes the rays cross between their ends.
 class Crossing {
@@ -193,7 +188,8 @@ class PacketOfRays {
           share = falloffOf<kFalloff>(kTag, hn::Add(q, hn::Mul(hn::Mul(beyond, beyond), perSquare)));
         } else {
           const Vec halfChord = hn::Mul(radius, hn::Sqrt(hn::Max(hn::Sub(one, q), zero)));
-          share = hn::Mul(falloffOf<kFalloff>(kTag, q), hn::Mul(capOf(t, halfChord), capOf(rest, halfChord)));
+          share =
+              hn::Mul(falloffOf<kFalloff>(kTag, q), hn::Mul(capOf(kTag, t, halfChord), capOf(kTag, rest, halfChord)));
         }
       } else {
         share = falloffOf<kFalloff>(kTag, q);

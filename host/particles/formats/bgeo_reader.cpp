@@ -76,13 +76,9 @@ BgeoReader::BgeoReader(std::string path) : ParticleFile(path), file_(std::move(p
     throw InputError(path_, "number of point attributes", fmt::format("0 to {}", kMostAttributes),
                      fmt::format("{}", attributes));
   const auto add = [&](std::string name, NumberType type, std::uint32_t arity, std::size_t offset) {
-    PlacedChannel placed;
-    placed.channel.name = std::move(name), placed.channel.type = type, placed.channel.arity = arity;
-    placed.offset = offset;
-    if (channel(placed.channel.name))
-      throw InputError(path_, "point attributes", "different names", fmt::format("'{}' twice", placed.channel.name));
-    channels_.push_back(placed.channel);
-    placed_.push_back(std::move(placed));
+    if (channel(name)) throw InputError(path_, "point attributes", "different names", fmt::format("'{}' twice", name));
+    placed_.emplace_back(std::move(name), type, arity, offset);
+    channels_.push_back(placed_.back().channel);
   };
   add("Position", NumberType::F32, 3, 0);
   rowBytes_ = kPlaceBytes;

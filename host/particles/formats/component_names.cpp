@@ -83,10 +83,7 @@ std::vector<PlacedChannel> plainColumns(const std::string& path, std::size_t wid
                      fmt::format("{} number{} a particle", width, width == 1 ? "" : "s"));
   std::vector<PlacedChannel> channels;
   const auto add = [&](std::string name, std::uint32_t arity, std::size_t column) {
-    PlacedChannel placed;
-    placed.channel.name = std::move(name), placed.channel.type = type, placed.channel.arity = arity;
-    placed.offset = column * numberSize(type);
-    channels.push_back(std::move(placed));
+    channels.emplace_back(std::move(name), type, arity, column * numberSize(type));
   };
   add("Position", 3, 0);
   if (width == 4) add("Density", 1, 3);

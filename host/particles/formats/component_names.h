@@ -11,6 +11,10 @@ namespace mote {
 struct PlacedChannel {
   Channel channel;
   std::size_t offset = 0;  ///< [bytes]
+
+  PlacedChannel() = default;
+  PlacedChannel(std::string name, NumberType type, std::uint32_t arity, std::size_t place)
+      : channel{std::move(name), type, arity}, offset(place) {}
 };
 
 /// Three scalars side by side, of one type, named as components become one channel of arity 3:

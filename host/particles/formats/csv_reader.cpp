@@ -3,16 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstring>
-#include <limits>
 #include <new>
 #include <optional>
 #include <string_view>
 
 #include "host/core/error.h"
 #include "host/particles/formats/channel_sink.h"
-#include "host/particles/formats/number_visit.h"
+#include "host/particles/formats/text_number.h"
 
 namespace mote {
 namespace {
@@ -32,16 +30,6 @@ std::string_view trimmed(std::string_view text) {
 std::string_view unquoted(std::string_view text) {
   return text.size() >= 2 && text.front() == '"' && text.back() == '"' ? trimmed(text.substr(1, text.size() - 2))
                                                                        : text;
-}
-
-std::optional<double> numberOf(std::string_view text) {
-  if (text.starts_with('+')) text.remove_prefix(1);
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || end != text.data() + text.size()) return std::nullopt;
-  if (error == std::errc::result_out_of_range)  // too large, or too near to 0: as strtod has it
-    return std::strtod(std::string(text).c_str(), nullptr);
-  return error == std::errc() ? std::optional(value) : std::nullopt;
 }
 
 char separatorOf(std::string_view line) {
@@ -76,7 +64,7 @@ bool leftOut(std::string_view line) { return line.empty() || line.front() == '#'
 std::pair<bool, std::size_t> numbersIn(std::string_view line) {
   std::size_t count = 0;
   bool all = true;
-  eachField(line, separatorOf(line), [&](std::string_view field) { all = all && numberOf(field), ++count; });
+  eachField(line, separatorOf(line), [&](std::string_view field) { all = all && numberIn(field), ++count; });
   return {all, count};
 }
 
@@ -131,23 +119,6 @@ class Lines {
   bool ended_ = false;
 };
 
-std::optional<NumberType> typeNamed(std::string_view name) {
-  for (std::int32_t k = 0; k < kNumberTypes; ++k)
-    if (numberName(static_cast<NumberType>(k)) == name) return static_cast<NumberType>(k);
-  return std::nullopt;
-}
-
-template <class T>
-T cast(double value) {
-  if constexpr (!std::is_integral_v<T>)
-    return static_cast<T>(value);
-  else  // 2^63 and 2^64 are the least that do not fit
-    return value >= static_cast<double>(std::numeric_limits<T>::min()) &&
-                   value < std::ldexp(1.0, std::numeric_limits<T>::digits)
-               ? static_cast<T>(value)
-               : T(0);
-}
-
 }  // namespace
 
 bool beginsAsTable(std::span<const std::byte> start) {
@@ -185,7 +156,7 @@ void CsvReader::setColumns(const std::string& first) {
   hasHeader_ = !numbers;
   if (!hasHeader_) {
     placed_ = plainColumns(path_, width, NumberType::F64);
-    for (std::size_t k = 0; k < width; ++k) columns_.push_back({{"", NumberType::F64, 1}, k * sizeof(double)});
+    for (std::size_t k = 0; k < width; ++k) columns_.emplace_back("", NumberType::F64, 1, k * sizeof(double));
     rowBytes_ = width * sizeof(double);
   } else {
     std::vector<PlacedChannel> merged;
@@ -193,12 +164,12 @@ void CsvReader::setColumns(const std::string& first) {
       NumberType type = NumberType::F64;
       const std::size_t blank = field.find(' ');
       if (blank != field.npos)
-        if (const std::optional<NumberType> named = typeNamed(field.substr(0, blank)))
+        if (const std::optional<NumberType> named = numberNamed(field.substr(0, blank)))
           type = *named, field = trimmed(field.substr(blank));
       const std::string name(field);
       if (name.empty())
         throw InputError(path_, fmt::format("header, column {}", columns_.size() + 1), "a name", "nothing");
-      columns_.push_back({{name, type, 1}, rowBytes_});
+      columns_.emplace_back(name, type, 1, rowBytes_);
       const bool goesOn = !merged.empty() && merged.back().channel.name == name;
       if (goesOn && merged.back().channel.type == type)
         ++merged.back().channel.arity;
@@ -234,16 +205,13 @@ void CsvReader::read(std::span<const ChannelRequest> requests) const {
       eachField(line, separator_, [&](std::string_view field) {
         if (k >= columns_.size()) return void(++k);
         const PlacedChannel& column = columns_[k++];
-        const std::optional<double> value = numberOf(field);
+        const std::optional<double> value = numberIn(field);
         if (!value)
           throw InputError(path_,
                            fmt::format("line {}, column {}{}", lines.number(), k,
                                        column.channel.name.empty() ? "" : " (" + column.channel.name + ")"),
                            "a number", fmt::format("'{}'", field.substr(0, 40)));
-        withNumberType(column.channel.type, [&]<class T>(T) {
-          const T number = cast<T>(*value);
-          std::memcpy(&rows[here * rowBytes_ + column.offset], &number, sizeof number);
-        });
+        storeNumber(*value, column.channel.type, &rows[here * rowBytes_ + column.offset]);
       });
       if (k != columns_.size())
         throw InputError(path_, fmt::format("line {}", lines.number()), fmt::format("{} columns", columns_.size()),

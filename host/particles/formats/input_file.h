@@ -10,6 +10,10 @@
 
 namespace mote {
 
+/// Bytes of which deflate, zlib and gzip make one at most: 258 of two bits, less the heads of their blocks (zlib.net,
+/// "Maximum Compression Factor"). LZ4 makes one of 255.
+constexpr std::uint64_t kDeflateExpansion = 1032;
+
 class InputFile {
  public:
   /// Throws InputError where there is none, or where it is no regular file that may be read.
@@ -45,7 +49,7 @@ class GzipFile {
   std::uint64_t bytes() const { return bytes_; }  ///< of the file as it is
   bool packed() const { return packed_; }
   /// What it can hold at most: its bytes, or what they could be unpacked to.
-  std::uint64_t mostBytes() const { return packed_ ? bytes_ * kMostExpansion : bytes_; }
+  std::uint64_t mostBytes() const { return packed_ ? bytes_ * kDeflateExpansion : bytes_; }
 
   /// Back to a place of what was packed: all before it is unpacked again.
   void seek(std::uint64_t position) const;

@@ -12,6 +12,7 @@
 #include "host/core/error.h"
 #include "host/core/log.h"
 #include "host/particles/formats/channel_sink.h"
+#include "host/particles/formats/section.h"
 
 namespace mote {
 namespace {
@@ -32,7 +33,7 @@ struct Field {
 /// The header's dictionary, as far as Python's literals of it go.
 class Header {
  public:
-  Header(const std::string& path, const std::string& text) : path_(path), text_(text) { parse(); }
+  Header(const std::string& path, std::string text) : path_(path), text_(std::move(text)) { parse(); }
 
   std::vector<Field> fields;  ///< one without a name where the type is a number
   bool structured = false, fortranOrder = false;
@@ -40,11 +41,9 @@ class Header {
 
  private:
   [[noreturn]] void fail(const std::string& expected) const {
-    std::string got = text_.substr(at_, 30);
-    for (char& c : got)
-      if (static_cast<unsigned char>(c) < 32 || static_cast<unsigned char>(c) > 126) c = '?';
+    const std::string got = text_.substr(std::min(at_, text_.size()), 30);
     throw InputError(path_, fmt::format("NPY header, character {}", at_), expected,
-                     got.empty() ? "the header's end" : "'" + got + "'");
+                     got.empty() ? "the header's end" : shown(got));
   }
 
   void skipSpace() {
@@ -168,7 +167,7 @@ class Header {
   }
 
   const std::string& path_;
-  const std::string& text_;
+  std::string text_;
   std::size_t at_ = 0;
 };
 
@@ -238,28 +237,23 @@ bool beginsAsNpy(std::span<const std::byte> start) {
 }
 
 NpyReader::NpyReader(std::string path) : ParticleFile(path), file_(std::move(path)) {
-  const auto bytes = [&](std::uint64_t count, const char* what) {
-    std::string text(count, '\0');
-    if (file_.read(reinterpret_cast<std::byte*>(text.data()), count) != count)
-      throw InputError(path_, what, fmt::format("{} bytes", count), "the file's end", "the file is cut off");
-    return text;
-  };
-  const std::string start = bytes(8, "NPY magic number and version");
+  Section section(file_, 0, file_.bytes());
+  const std::string start = section.bytes(8, "NPY magic number and version");
   if (std::memcmp(start.data(), kMagic, sizeof kMagic) != 0)
     throw InputError(path_, "NPY magic number", "\\x93NUMPY", "something else");
   const int major = static_cast<unsigned char>(start[6]);
   if (major < 1 || major > 3)
     throw InputError(path_, "NPY version", "1.0, 2.0 or 3.0", fmt::format("{}.{}", major, start[7] & 0xff));
-  const std::string lengthBytes = bytes(major == 1 ? 2 : 4, "NPY header length");
+  const std::string lengthBytes = section.bytes(major == 1 ? 2 : 4, "NPY header length");
   std::uint64_t length = 0;
   for (std::size_t k = 0; k < lengthBytes.size(); ++k)
     length |= std::uint64_t{static_cast<unsigned char>(lengthBytes[k])} << (8 * k);
   if (length > kMostHeader || length > file_.bytes())
     throw InputError(path_, "NPY header length", fmt::format("at most {} bytes", std::min(kMostHeader, file_.bytes())),
                      fmt::format("{}", length), "the file is cut off or damaged");
-  const Header header(path_, bytes(length, "NPY header"));
+  const Header header(path_, section.bytes(length, "NPY header"));
   format_ = fmt::format("NPY {}.{}", major, start[7] & 0xff);
-  dataBegin_ = 8 + lengthBytes.size() + length;
+  dataBegin_ = section.position();
 
   Dtype dtype;
   for (const Field& field : header.fields) {
@@ -270,7 +264,7 @@ NpyReader::NpyReader(std::string path) : ParticleFile(path), file_(std::move(pat
         throw InputError(path_, fmt::format("descr, field '{}'", field.name), "one byte order in all fields",
                          fmt::format("'{}'", field.type));
       if (number.bytes > 1) dtype.bigEndian = number.bigEndian;
-      dtype.columns.push_back({{field.name, *number.type, static_cast<std::uint32_t>(arity)}, dtype.bytes});
+      dtype.columns.emplace_back(field.name, *number.type, static_cast<std::uint32_t>(arity), dtype.bytes);
     }
     if (arity * number.bytes > kMostRowBytes - dtype.bytes)
       throw InputError(path_, "descr", fmt::format("at most {} bytes a particle", kMostRowBytes), "more");

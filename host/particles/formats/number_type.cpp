@@ -16,4 +16,10 @@ constexpr TypeFacts kTypes[kNumberTypes] = {{"int16", 2},   {"int32", 4},   {"in
 std::size_t numberSize(NumberType type) { return kTypes[static_cast<std::size_t>(type)].size; }
 std::string_view numberName(NumberType type) { return kTypes[static_cast<std::size_t>(type)].name; }
 
+std::optional<NumberType> numberNamed(std::string_view name) {
+  for (std::int32_t k = 0; k < kNumberTypes; ++k)
+    if (kTypes[k].name == name) return static_cast<NumberType>(k);
+  return std::nullopt;
+}
+
 }  // namespace mote

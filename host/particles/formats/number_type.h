@@ -2,6 +2,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
 namespace mote {
@@ -14,5 +15,7 @@ constexpr std::int32_t kNumberTypes = 11;
 std::size_t numberSize(NumberType type);
 /// "float32", "int8", …
 std::string_view numberName(NumberType type);
+/// The type of that name.
+std::optional<NumberType> numberNamed(std::string_view name);
 
 }  // namespace mote

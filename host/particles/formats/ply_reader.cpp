@@ -17,6 +17,7 @@
 #include "host/particles/formats/byte_stream.h"
 #include "host/particles/formats/channel_sink.h"
 #include "host/particles/formats/number_visit.h"
+#include "host/particles/formats/text_number.h"
 
 namespace mote {
 namespace {
@@ -190,7 +191,7 @@ PlyReader::PlyReader(std::string path) : ParticleFile(path), file_(std::move(pat
     if (std::any_of(columns_.begin(), columns_.end(), [&](const auto& c) { return c.channel.name == p.name; }))
       throw InputError(path_, fmt::format("element {}", found->name), "properties of different names",
                        fmt::format("'{}' twice", p.name));
-    columns_.push_back({{p.name, p.type, 1}, rowBytes_});
+    columns_.emplace_back(p.name, p.type, 1, rowBytes_);
     rowBytes_ += numberSize(p.type);
   }
   placed_ = withVectors(columns_);
@@ -296,23 +297,12 @@ void PlyReader::readText(std::vector<ChannelSink>& sinks) const {
     for (std::size_t i = 0; i < here; ++i)
       for (const PlacedChannel& column : columns_) {
         const std::string word = bytes.word(kMostDigits);
-        const char* begin = word.data() + (word.starts_with('+') ? 1 : 0);
-        double value = 0;
-        const auto [end, error] = std::from_chars(begin, word.data() + word.size(), value);
-        if (word.empty() || error != std::errc() || end != word.data() + word.size())
+        const std::optional<double> value = numberIn(word);
+        if (!value)
           throw InputError(path_, fmt::format("particle {} of {}, {}", first + i, count_, column.channel.name),
                            "a number", word.empty() ? "the file's end" : "'" + word + "'",
                            word.empty() ? "the file is cut off" : "");
-        withNumberType(column.channel.type, [&]<class T>(T) {
-          T number;
-          if constexpr (std::is_integral_v<T>)
-            number = value >= double(std::numeric_limits<T>::min()) && value <= double(std::numeric_limits<T>::max())
-                         ? static_cast<T>(value)
-                         : T(0);
-          else
-            number = static_cast<T>(value);
-          std::memcpy(&rows[i * rowBytes_ + column.offset], &number, sizeof number);
-        });
+        storeNumber(*value, column.channel.type, &rows[i * rowBytes_ + column.offset]);
       }
     for (ChannelSink& sink : sinks) sink.append(rows.data() + placed_[sink.index()].offset, rowBytes_, here);
   }

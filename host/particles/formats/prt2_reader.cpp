@@ -15,6 +15,7 @@
 #include "host/core/log.h"
 #include "host/particles/formats/channel_sink.h"
 #include "host/particles/formats/number_visit.h"
+#include "host/particles/formats/section.h"
 
 namespace mote {
 namespace {
@@ -24,16 +25,8 @@ constexpr std::uint32_t kVersion = 3;
 constexpr std::uint64_t kMostChannelBytes = 50000;  // as its makers' reader has it
 constexpr std::uint64_t kMostMetadataBytes = 1 << 20, kMostParticleBytes = 1 << 20;
 constexpr std::uint64_t kNotClosed = ~std::uint64_t{0};
-/// Deflate's best case, as in prt_reader.cpp; LZ4's is 255.
-constexpr std::uint64_t kMaxExpansion = 1032;
 /// LZ4 counts in int.
 constexpr std::uint64_t kMostBlockBytes = std::uint64_t{1} << 30;
-
-std::optional<NumberType> typeNamed(std::string_view name) {
-  for (std::int32_t k = 0; k < kNumberTypes; ++k)
-    if (numberName(static_cast<NumberType>(k)) == name) return static_cast<NumberType>(k);
-  return std::nullopt;
-}
 
 /// "float32" or "3 * float32", with any blanks.
 std::optional<std::pair<NumberType, std::uint32_t>> typeAndArity(std::string text) {
@@ -44,15 +37,9 @@ std::optional<std::pair<NumberType, std::uint32_t>> typeAndArity(std::string tex
     if (error != std::errc() || end != text.data() + times || arity == 0) return std::nullopt;
     text.erase(0, times + 1);
   }
-  const std::optional<NumberType> type = typeNamed(text);
+  const std::optional<NumberType> type = numberNamed(text);
   if (!type) return std::nullopt;
   return std::pair(*type, arity);
-}
-
-std::string shown(std::string_view raw) {
-  std::string text;
-  for (const char c : raw.substr(0, 40)) text += c >= 32 && c < 127 ? c : '?';
-  return "'" + text + (raw.size() > 40 ? "…'" : "'");
 }
 
 /// Unpacks a block into `to`, which it must fill.
@@ -85,34 +72,17 @@ void untranspose(std::span<const std::byte> from, std::size_t count, std::span<s
 
 }  // namespace
 
-/// A chunk of the file that cannot be left.
-class Prt2Reader::Chunk {
+/// A chunk of the file.
+class Prt2Reader::Chunk : public Section {
  public:
   Chunk(const InputFile& file, std::string kind, std::uint64_t begin, std::uint64_t end)
-      : file_(file), kind_(std::move(kind)), at_(begin), end_(end) {
-    file_.seek(begin);
-  }
-  const std::string& kind() const { return kind_; }
-  std::uint64_t position() const { return at_; }
-  std::uint64_t end() const { return end_; }
-  std::uint64_t left() const { return end_ - at_; }
-  std::string what() const { return fmt::format("chunk {} at byte {}", shown(kind_), at_); }
+      : Section(file, begin, end), path_(file.path()), kind_(std::move(kind)) {}
 
-  std::string bytes(std::uint64_t count) {
-    if (count > left())
-      throw InputError(file_.path(), what(), fmt::format("{} bytes", count), fmt::format("only {}", left()),
-                       "the file is damaged");
-    std::string data(count, '\0');
-    if (file_.read(reinterpret_cast<std::byte*>(data.data()), count) != count)
-      throw InputError(file_.path(), what(), fmt::format("{} bytes", count), "the file's end", "the file is cut off");
-    at_ += count;
-    return data;
-  }
+  std::string what() const { return fmt::format("chunk {} at byte {}", shown(kind_), position()); }
+  std::string bytes(std::uint64_t count) { return Section::bytes(count, what()); }
   template <class T>
   T number() {
-    T value;
-    std::memcpy(&value, bytes(sizeof(T)).data(), sizeof(T));
-    return value;
+    return Section::number<T>(what());
   }
   /// LEB128, at most ten bytes.
   std::uint64_t varint() {
@@ -123,7 +93,7 @@ class Prt2Reader::Chunk {
       value |= std::uint64_t{byte & 0x7fu} << shift;
       if ((byte & 0x80) == 0) return value;
     }
-    throw InputError(file_.path(), what(), "a number of at most ten bytes", "more", "the file is damaged");
+    throw InputError(path_, what(), "a number of at most ten bytes", "more", "the file is damaged");
   }
   std::string text() {
     const std::uint64_t size = varint();
@@ -131,9 +101,8 @@ class Prt2Reader::Chunk {
   }
 
  private:
-  const InputFile& file_;
+  const std::string& path_;
   std::string kind_;
-  std::uint64_t at_, end_;
 };
 
 bool beginsAsPrt2(std::span<const std::byte> start) {
@@ -191,9 +160,7 @@ void Prt2Reader::readChannels(Chunk& chunk) {
     if (name.empty() || channel(name)) throw InputError(path_, what, "a name that no other channel has", shown(name));
     if (size > kMostParticleBytes - particleBytes_)
       throw InputError(path_, what, fmt::format("at most {} bytes a particle", kMostParticleBytes), "more");
-    Channel one;
-    one.name = name, one.type = known->first, one.arity = known->second;
-    channels_.push_back(std::move(one));
+    channels_.push_back({name, known->first, known->second});
     offsets_.push_back(particleBytes_);
     particleBytes_ += size;
   }
@@ -278,7 +245,7 @@ void Prt2Reader::choose(std::span<const Stream> streams, std::span<const std::st
   }
   stream_ = *best;
   count_ = stream_.particles;
-  const std::uint64_t bytes = stream_.end - stream_.begin, most = stream_.packed() ? bytes * kMaxExpansion : bytes;
+  const std::uint64_t bytes = stream_.end - stream_.begin, most = stream_.packed() ? bytes * kDeflateExpansion : bytes;
   if (count_ > most / particleBytes_)
     throw InputError(path_, "particle count",
                      fmt::format("at most {}, what {} bytes can hold", most / particleBytes_, bytes),
@@ -315,7 +282,7 @@ void Prt2Reader::read(std::span<const ChannelRequest> requests) const {
         bytes -= sizeof offset;
       }
       const std::uint64_t size = here * particleBytes_;
-      if (stream_.packed() ? size > std::min(bytes * kMaxExpansion, kMostBlockBytes) : size != bytes)
+      if (stream_.packed() ? size > std::min(bytes * kDeflateExpansion, kMostBlockBytes) : size != bytes)
         fail(fmt::format("the bytes of {} particles", here), fmt::format("{}", bytes));
       const std::string data = blocks.bytes(bytes);
       const auto raw = std::as_bytes(std::span(data));

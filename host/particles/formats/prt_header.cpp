@@ -8,6 +8,7 @@
 
 #include "host/core/error.h"
 #include "host/core/log.h"
+#include "host/particles/formats/section.h"
 
 namespace mote {
 namespace {
@@ -15,59 +16,11 @@ namespace {
 // No producer comes near; it keeps the buffer that one particle needs small whatever an arity claims.
 constexpr std::uint64_t kMaxParticleBytes = 1 << 20;
 
-// A value in a message: printable characters only, and not more than a line of them.
-std::string shown(std::string_view raw) {
-  std::string text = "'";
-  for (const char c : raw.substr(0, 40))
-    text += c >= 32 && c < 127 ? std::string(1, c) : fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
-  return text + (raw.size() > 40 ? "…'" : "'");
-}
-
-/// A window of the file that cannot be left: every read is checked against what the section has.
-class Section {
- public:
-  Section(const std::string& path, std::FILE* file, std::uint64_t begin, std::uint64_t end)
-      : path_(path), file_(file), at_(begin), end_(end) {}
-
-  std::uint64_t position() const { return at_; }
-  std::uint64_t left() const { return end_ - at_; }
-
-  std::string bytes(std::uint64_t count, const char* what) {
-    if (count > left())
-      throw InputError(path_, what, fmt::format("{} bytes at byte {}", count, at_), fmt::format("only {}", left()),
-                       "the file is cut off or its header is damaged");
-    std::string buffer(count, '\0');
-    if (std::fread(buffer.data(), 1, buffer.size(), file_) != buffer.size())
-      throw MachineError(fmt::format("{}: reading {} bytes at byte {} failed", path_, count, at_));
-    at_ += count;
-    return buffer;
-  }
-
-  template <class T>
-  T number(const char* what) {
-    const std::string raw = bytes(sizeof(T), what);
-    T value;
-    std::memcpy(&value, raw.data(), sizeof value);
-    return value;
-  }
-
-  void skip(std::uint64_t count) {  // count ≤ left(), checked by the callers, who know the field's name
-    if (fseeko(file_, static_cast<off_t>(count), SEEK_CUR) != 0)
-      throw MachineError(fmt::format("{}: seeking to byte {} failed", path_, at_ + count));
-    at_ += count;
-  }
-
- private:
-  const std::string& path_;
-  std::FILE* file_;
-  std::uint64_t at_, end_;
-};
-
 struct Parser {
-  const std::string& path;
-  std::FILE* file;
-  std::uint64_t fileBytes;
+  const InputFile& file;
   PrtHeader header{};
+  const std::string& path = file.path();
+  const std::uint64_t fileBytes = file.bytes();
 
   [[noreturn]] void fail(std::string_view field, std::string_view expected, std::string_view got,
                          std::string_view hint = {}) const {
@@ -76,7 +29,7 @@ struct Parser {
 
   /// Bytes 0 to 56; returns the header's length.
   std::uint64_t parseFixed() {
-    Section section(path, file, 0, fileBytes);
+    Section section(file, 0, fileBytes);
     const std::string magic = section.bytes(sizeof kPrtMagic, "PRT magic number");
     if (magic.compare(0, 5, "\xC0PRT2") == 0) fail("", "a PRT 1.0 or 1.1 file", "PRT 2");
     if (std::memcmp(magic.data(), kPrtMagic, sizeof kPrtMagic) != 0)
@@ -103,9 +56,9 @@ struct Parser {
     return static_cast<std::uint64_t>(length);
   }
 
-  /// Chunks of a 1.1 header, up to `Stop`. Leaves the file at `end`.
+  /// Chunks of a 1.1 header, up to `Stop`.
   void parseChunks(std::uint64_t end) {
-    Section section(path, file, kPrtFixedHeader, end);
+    Section section(file, kPrtFixedHeader, end);
     while (true) {
       if (section.left() == 0) fail("metadata", "a Stop chunk at its end", "none before the channels");
       const std::string kind = section.bytes(4, "metadata chunk type");
@@ -177,7 +130,7 @@ struct Parser {
 
   /// The channel table behind the header. Returns where the particles begin.
   std::uint64_t parseChannels(std::uint64_t begin) {
-    Section section(path, file, begin, fileBytes);
+    Section section(file, begin, fileBytes);
     const auto reserved = section.number<std::int32_t>("reserved number");
     if (reserved != 4) fail("reserved number", "4", fmt::format("{}", reserved));
     const auto count = section.number<std::int32_t>("channel count");
@@ -272,13 +225,10 @@ struct Parser {
 
 }  // namespace
 
-ParsedPrtHeader parsePrtHeader(const std::string& path, std::FILE* file, std::uint64_t fileBytes) {
-  Parser parser{path, file, fileBytes};
+ParsedPrtHeader parsePrtHeader(const InputFile& file) {
+  Parser parser{file};
   const std::uint64_t length = parser.parseFixed();
-  if (parser.header.minorVersion == 1)
-    parser.parseChunks(length);
-  else if (fseeko(file, static_cast<off_t>(length), SEEK_SET) != 0)
-    throw MachineError(fmt::format("{}: seeking to byte {} failed", path, length));
+  if (parser.header.minorVersion == 1) parser.parseChunks(length);
   const std::uint64_t dataBegin = parser.parseChannels(length);
   parser.checkChannelMetadata();
   return {std::move(parser.header), dataBegin};

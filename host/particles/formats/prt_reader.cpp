@@ -18,9 +18,6 @@
 namespace mote {
 namespace {
 
-// Deflate's best case: 258 bytes from one length and one distance code of a bit each, less block headers (zlib.net,
-// "Maximum Compression Factor").
-constexpr std::uint64_t kMaxExpansion = 1032;
 // Large enough to hide a task's start, small enough that the blocks in flight stay in the cache.
 constexpr std::size_t kBlockBytes = 1 << 19;
 constexpr std::size_t kInputBytes = 1 << 17;
@@ -124,7 +121,7 @@ bool beginsAsPrt(std::span<const std::byte> start) {
 }
 
 PrtReader::PrtReader(std::string path) : ParticleFile(path), file_(std::move(path)) {
-  ParsedPrtHeader parsed = parsePrtHeader(path_, file_.handle(), file_.bytes());
+  ParsedPrtHeader parsed = parsePrtHeader(file_);
   header_ = std::move(parsed.header);
   dataBegin_ = parsed.dataBegin;
   format_ = fmt::format("PRT 1.{}", header_.minorVersion);
@@ -133,11 +130,11 @@ PrtReader::PrtReader(std::string path) : ParticleFile(path), file_(std::move(pat
   metadata_ = header_.metadata;
   const std::uint64_t left = file_.bytes() - dataBegin_;
   // particleBytes ≥ 1, and left × 1032 stays far below 2^64 for any file that exists; the division cannot overflow.
-  if (header_.count > left * kMaxExpansion / header_.particleBytes)
+  if (header_.count > left * kDeflateExpansion / header_.particleBytes)
     throw InputError(
         path_, "particle count",
         fmt::format("at most {}, what {} bytes of zlib data can hold ({} bytes a particle, expansion at most {})",
-                    left * kMaxExpansion / header_.particleBytes, left, header_.particleBytes, kMaxExpansion),
+                    left * kDeflateExpansion / header_.particleBytes, left, header_.particleBytes, kDeflateExpansion),
         fmt::format("{}", header_.count), "the file is cut off or its header is damaged");
 }
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <new>
@@ -12,7 +11,8 @@
 
 #include "host/core/error.h"
 #include "host/particles/formats/channel_sink.h"
-#include "host/particles/formats/number_visit.h"
+#include "host/particles/formats/section.h"
+#include "host/particles/formats/text_number.h"
 
 namespace mote {
 namespace {
@@ -60,17 +60,6 @@ void skipMetadata(ByteStream& bytes) {
   while (!bytes.line(kMostLine).empty()) continue;
 }
 
-template <class T>
-T cast(double value) {
-  if constexpr (!std::is_integral_v<T>)
-    return static_cast<T>(value);
-  else
-    return value >= static_cast<double>(std::numeric_limits<T>::min()) &&
-                   value < std::ldexp(1.0, std::numeric_limits<T>::digits)
-               ? static_cast<T>(value)
-               : T(0);
-}
-
 }  // namespace
 
 bool beginsAsVtk(std::span<const std::byte> start) {
@@ -80,10 +69,8 @@ bool beginsAsVtk(std::span<const std::byte> start) {
 VtkReader::VtkReader(std::string path) : ParticleFile(path), file_(std::move(path)) { parse(); }
 
 void VtkReader::fail(const ByteStream& bytes, const std::string& expected, const std::string& got) const {
-  std::string shown;
-  for (const char c : got.substr(0, 60)) shown += static_cast<unsigned char>(c) < 32 ? '?' : c;
   throw InputError(path_, fmt::format("VTK, at byte {}", bytes.position()), expected,
-                   got.empty() ? "the file's end" : "'" + shown + "'", got.empty() ? "the file is cut off" : "");
+                   got.empty() ? "the file's end" : shown(got), got.empty() ? "the file is cut off" : "");
 }
 
 std::uint64_t VtkReader::number(ByteStream& bytes, const char* what) const {
@@ -123,13 +110,8 @@ void VtkReader::keep(ByteStream& bytes, std::string name, const std::string& typ
   if (!ofPoints || !known) return;
   if (tuples != count_) fail(bytes, fmt::format("{} for as many points", count_), std::to_string(tuples));
   if (channel(name)) fail(bytes, "arrays of different names", name);
-  Channel one;
-  one.name = name, one.type = *known, one.arity = static_cast<std::uint32_t>(arity);
-  channels_.push_back(std::move(one));
-  Array array;
-  array.name = std::move(name), array.type = *known, array.arity = static_cast<std::uint32_t>(arity);
-  array.begin = begin;
-  arrays_.push_back(std::move(array));
+  channels_.push_back({std::move(name), *known, static_cast<std::uint32_t>(arity)});
+  begins_.push_back(begin);
 }
 
 void VtkReader::parse() {
@@ -248,30 +230,27 @@ void VtkReader::read(std::span<const ChannelRequest> requests) const {
     for (const ChannelRequest& request : requests) {
       ChannelSink sink(path_, channels_, request);
       sink.reserve(count_);
-      const Array& array = arrays_[sink.index()];
+      const Channel& array = channels_[sink.index()];
+      const std::uint64_t begin = begins_[sink.index()];
       const std::size_t size = numberSize(array.type), row = size * array.arity;
       const std::size_t perBlock = std::max<std::size_t>(1, kBlockBytes / row);
-      ByteStream bytes(file_, array.begin);
+      ByteStream bytes(file_, begin);
       for (std::uint64_t first = 0; first < count_; first += perBlock) {
         const auto here = static_cast<std::size_t>(std::min<std::uint64_t>(perBlock, count_ - first));
         rows.resize(here * row);
         if (binary_) {
-          file_.seek(array.begin + first * row);
+          file_.seek(begin + first * row);
           if (file_.read(rows.data(), rows.size()) != rows.size())
             throw InputError(path_, array.name, fmt::format("{} of them", count_), "the file's end",
                              "it became shorter while it was read");
         } else {
           for (std::size_t i = 0; i < here * array.arity; ++i) {
             const std::string word = bytes.word(kMostWord);
-            double value = 0;
-            const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-            if (word.empty() || error != std::errc() || end != word.data() + word.size())
+            const std::optional<double> value = numberIn(word);
+            if (!value)
               throw InputError(path_, fmt::format("{} of point {}", array.name, first + i / array.arity), "a number",
                                "'" + word.substr(0, 40) + "'");
-            withNumberType(array.type, [&]<class T>(T) {
-              const T number = cast<T>(value);
-              std::memcpy(&rows[i * size], &number, sizeof number);
-            });
+            storeNumber(*value, array.type, &rows[i * size]);
           }
         }
         sink.append(rows.data(), row, here, binary_);

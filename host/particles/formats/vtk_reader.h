@@ -24,14 +24,6 @@ class VtkReader : public ParticleFile {
   void read(std::span<const ChannelRequest> requests) const override;
 
  private:
-  /// Numbers one behind the other.
-  struct Array {
-    std::string name;
-    NumberType type = NumberType::F32;
-    std::uint32_t arity = 1;
-    std::uint64_t begin = 0;
-  };
-
   void parse();
   [[noreturn]] void fail(const ByteStream& bytes, const std::string& expected, const std::string& got) const;
   std::uint64_t number(ByteStream& bytes, const char* what) const;
@@ -43,7 +35,7 @@ class VtkReader : public ParticleFile {
   InputFile file_;
   bool binary_ = false;
   int version_ = 0;
-  std::vector<Array> arrays_;  ///< of the channels
+  std::vector<std::uint64_t> begins_;  ///< where each channel's numbers stand, one behind the other
 };
 
 }  // namespace mote
