@@ -24,9 +24,9 @@ layout(constant_id = 7) const bool kColours = false;
 #include "lib/falloff.glsl"
 
 /// The twin of weightOfForm in host/lighting/grid/vectors-inl.h.
-float weightOfForm(float q) {
+float weightOfForm(float q, float slope) {
   if (kFalloff == kFalloffLinear || kFalloff == kFalloffSphere) return falloff(q, kFalloff);
-  const float slope = 1.0 / kGridSmoothSupport, u = 1.0 - q;
+  const float u = 1.0 - q;
   return max(min(u * u, slope * u - (slope - 1.0)), 0.0);
 }
 
@@ -44,7 +44,14 @@ float depthShare(float x) {
   return x < 0.0 ? 0.5 - part : 0.5 + part;
 }
 
-float weightAt(GridKernel p, float dx, float dy, float bdy, float cdy2, vec2 uv) {
+/// GridParticles::slope: the form's greater eigenvalue is 1 / the narrowed square of the radius [1 / cells²].
+float slopeOf(GridKernel p) {
+  float inverse = p.a;
+  if (!kCurved || p.c >= 0.0) inverse = 0.5 * (p.a + p.c + length(vec2(p.a - p.c, p.b)));
+  return 1.0 / max(kGridSmoothSupport, 1.0 - kGridSmoothMargin * sqrt(inverse));
+}
+
+float weightAt(GridKernel p, float slope, float dx, float dy, float bdy, float cdy2, vec2 uv) {
   const float tent = kTents ? max(1.0 - abs(dx), 0.0) * max(1.0 - abs(dy), 0.0) : 0.0;
   if (!kEllipses && !kCurved) return tent;
   float q = (p.a * dx + bdy) * dx + cdy2;
@@ -52,7 +59,7 @@ float weightAt(GridKernel p, float dx, float dy, float bdy, float cdy2, vec2 uv)
     const float across = dx * uv.y - dy * uv.x;
     q = p.c < 0.0 ? p.a * (dx * dx + dy * dy + across * across) / (1.0 + uv.x * uv.x + uv.y * uv.y) : q;
   }
-  const float value = weightOfForm(q);
+  const float value = weightOfForm(q, slope);
   return kTents && p.c == 0.0 ? tent : value;
 }
 
@@ -67,6 +74,7 @@ GridKernel kernelAt(uint i) {
 }
 
 void addParticle(GridKernel p, GridStrand strand, float bin) {
+  const float slope = slopeOf(p);
   float share[kBlockBins];
   float before = depthShare((bin - p.depth) * p.inverseRadius);
   [[unroll]] for (uint k = 0; k < kBlockBins; ++k) {
@@ -79,7 +87,7 @@ void addParticle(GridKernel p, GridStrand strand, float bin) {
     [[unroll]] for (uint c = 0; c < kBlockEdge; ++c) {
       const float dx = (strand.column + float(c)) - p.x;
       const vec2 uv = vec2(strand.u + float(c) * params.cell, strand.v + float(r) * params.cell);
-      const float at = weightAt(p, dx, dy, bdy, cdy2, uv);
+      const float at = weightAt(p, slope, dx, dy, bdy, cdy2, uv);
       [[unroll]] for (uint k = 0; k < kBlockBins; ++k) sum[(k * kBlockEdge + r) * kBlockEdge + c] += at * share[k];
     }
   }

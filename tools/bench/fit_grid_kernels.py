@@ -19,11 +19,11 @@ import numpy as np
 FINE = 8  # samples along a cell's edge
 PLACES = (np.arange(6) + 0.5) / 6  # of the centre in its cell
 
-# Falloff, ∫ F dq, and tentBelow, narrowing, support.
+# Falloff, ∫ F dq, and tentBelow, narrowing, leastSupport, margin.
 FALLOFFS = {
-    "smooth": (lambda q: np.maximum(1 - q, 0) ** 2, 1 / 3, 2.25, 0.73, 0.75),
-    "linear": (lambda q: np.maximum(1 - np.sqrt(q), 0), 1 / 3, 1.9, 0.65, 1.0),
-    "sphere": (lambda q: np.sqrt(np.maximum(1 - q, 0)), 2 / 3, 1.4, 0.4, 1.0),
+    "smooth": (lambda q: np.maximum(1 - q, 0) ** 2, 1 / 3, 2.25, 0.73, 0.75, 0.72),
+    "linear": (lambda q: np.maximum(1 - np.sqrt(q), 0), 1 / 3, 1.9, 0.65, 1.0, 0.0),
+    "sphere": (lambda q: np.sqrt(np.maximum(1 - q, 0)), 2 / 3, 1.4, 0.4, 1.0, 0.0),
 }
 
 
@@ -33,10 +33,11 @@ def tent(x):
 
 def ours(falloff, radius):
     """The weights as a function of the distances in cells, squared; None: a tent."""
-    shape, _, tent_below, narrowing, support = FALLOFFS[falloff]
+    shape, _, tent_below, narrowing, least, margin = FALLOFFS[falloff]
     if radius * radius <= tent_below:
         return None
     square = radius * radius - narrowing
+    support = max(least, 1 - margin / np.sqrt(square))
 
     def weight(distance2):
         q = distance2 / square
@@ -89,9 +90,11 @@ def errors(falloff, radius, nodes):
 
 def main():
     print(f"{'falloff':8} {'cell':>6} {'nodes':>6} {'ours':>8} {'F(q)':>14} {'best':>8}")
-    for falloff, (_, _, tent_below, narrowing, support) in FALLOFFS.items():
-        for nodes in range(2, 9):
-            square = tent_below if nodes == 2 else (nodes / 2) ** 2 / support + narrowing
+    for falloff, (_, _, tent_below, narrowing, least, margin) in FALLOFFS.items():
+        for nodes in range(2, 13):
+            # Half a window squared is least · s, or s − margin · √s, of the narrowed square s.
+            whole = (margin / 2 + np.hypot(margin / 2, nodes / 2)) ** 2
+            square = tent_below if nodes == 2 else min((nodes / 2) ** 2 / least, whole) + narrowing
             radius = np.sqrt(square) * (1 - 1e-6)
             found = errors(falloff, radius, nodes)
             plain = int(np.ceil(2 * radius))

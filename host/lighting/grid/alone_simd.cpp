@@ -54,18 +54,17 @@ HWY_INLINE float sumOf(const std::vector<float>& values, std::size_t count) {
 }
 
 template <layout::uint kFalloff>
-HWY_INLINE float drawFootprint(const GridTile& tile, std::size_t i, Footprint& f) {
-  const GridParticles& p = tile.particles;
+HWY_INLINE float drawFootprint(const GridParticles& p, std::size_t i, Footprint& f) {
   const float x = p.points.x[i], y = p.points.y[i], a = p.a[i], b = p.b[i], c = p.c[i];
-  // Half widths of the ellipse a·x² + b·x·y + c·y² = support.
-  const float determinant = (a * c - 0.25f * (b * b)) / static_cast<float>(tile.shape->weights.support);
+  // Half widths of the ellipse a·x² + b·x·y + c·y² = 1 / slope.
+  const float slope = p.slope[i], determinant = (a * c - 0.25f * (b * b)) * slope;
   const float halfX = std::sqrt(c / determinant), halfY = std::sqrt(a / determinant);
   f.resize(x - halfX, y - halfY, x + halfX, y + halfY);
   eachVector(f, [&](int row, Vec column, float* values, std::size_t) {
     const float dy = static_cast<float>(row) - y;
     const Vec dx = hn::Sub(column, set(x));
     const Vec q = hn::Add(hn::Mul(hn::Add(hn::Mul(set(a), dx), set(b * dy)), dx), set(c * (dy * dy)));
-    hn::StoreU(weightOfForm<kFalloff>(q), kTag, values);  // the next row overwrites what is beyond
+    hn::StoreU(weightOfForm<kFalloff>(q, set(slope)), kTag, values);  // the next row overwrites what is beyond
   });
   return sumOf(f.values, f.index(0, f.rows));
 }
@@ -80,7 +79,7 @@ HWY_NOINLINE float drawCurvedFootprint(const GridTile& tile, std::size_t i, Foot
   const dvec3 centre = dvec3(p.points.sourceX[i], p.points.sourceY[i], p.points.sourceZ[i]) - tile.frame.origin;
   const double z = glm::dot(centre, tile.frame.axis);
   // As wide as its narrowed or widened kernel.
-  const NodeRange nodes = curvedNodeRange(centre, z * std::sqrt(tile.shape->weights.support / k), tile.frame, cell);
+  const NodeRange nodes = curvedNodeRange(centre, z / std::sqrt(k * p.slope[i]), tile.frame, cell);
   const dvec2 corner(tile.firstColumn, tile.firstRow), lo = nodes.lo - corner, hi = nodes.hi - corner;
   f.resize(lo.x, lo.y, hi.x, hi.y);
   weighted.resize(f.values.size());
@@ -93,7 +92,7 @@ HWY_NOINLINE float drawCurvedFootprint(const GridTile& tile, std::size_t i, Foot
     const Vec du = hn::Sub(set(pu), u), cross = hn::Sub(hn::Mul(du, v), hn::Mul(dv, u));
     const Vec n = hn::Add(one, hn::Add(hn::Mul(u, u), hn::Mul(v, v)));
     const Vec b2 = hn::Add(hn::Add(hn::Mul(du, du), hn::Mul(dv, dv)), hn::Mul(cross, cross));
-    const Vec value = weightOfForm<kFalloff>(hn::Div(hn::Mul(b2, set(k)), n));
+    const Vec value = weightOfForm<kFalloff>(hn::Div(hn::Mul(b2, set(k)), n), set(p.slope[i]));
     hn::StoreU(value, kTag, values);
     hn::StoreU(hn::Div(value, hn::Mul(n, hn::Sqrt(n))), kTag,
                &weighted[static_cast<std::size_t>(values - f.values.data())]);
@@ -119,7 +118,7 @@ HWY_INLINE LoneKernel drawWith(const GridTile& tile, std::size_t i, Footprint& f
   static thread_local std::vector<float> weighted;
   const GridParticles& p = tile.particles;
   const float sum =
-      p.curved[i] > 0 ? drawCurvedFootprint<kFalloff>(tile, i, f, weighted) : drawFootprint<kFalloff>(tile, i, f);
+      p.curved[i] > 0 ? drawCurvedFootprint<kFalloff>(tile, i, f, weighted) : drawFootprint<kFalloff>(p, i, f);
   LoneKernel kernel{f.x0, f.y0, f.columns, f.rows};
   if (!(sum > 0)) return kernel;
   kernel.scale = p.mass[i] / sum;

@@ -64,7 +64,7 @@ HWY_INLINE void weigh(const GridParticles& p, std::size_t first, Batch& batch) {
     const Window<kNodes> x(load(&p.points.x[i])), y(load(&p.points.y[i]));
     hn::StoreU(hn::ConvertTo(kIntTag, x.begin), kIntTag, batch.column + lane);
     hn::StoreU(hn::ConvertTo(kIntTag, y.begin), kIntTag, batch.row + lane);
-    const Vec a = load(&p.a[i]), b = load(&p.b[i]), c = load(&p.c[i]), one = set(1);
+    const Vec a = load(&p.a[i]), b = load(&p.b[i]), c = load(&p.c[i]), slope = load(&p.slope[i]), one = set(1);
     Vec sum = hn::Zero(kTag), near[3];  // what lies about the centre in the rows from kBelow − 1 on
     for (int row = 0; row < kNodes; ++row) {
       const Vec dy = hn::Sub(set(static_cast<float>(row)), y.at);
@@ -75,7 +75,7 @@ HWY_INLINE void weigh(const GridParticles& p, std::size_t first, Batch& batch) {
         if constexpr (kNodes == 2) {  // a tent
           values[column] = hn::Mul(hn::Sub(one, hn::Abs(dx)), hn::Sub(one, hn::Abs(dy)));
         } else {
-          values[column] = weightOfForm<kFalloff>(hn::Add(hn::Mul(hn::Add(hn::Mul(a, dx), bdy), dx), cdy2));
+          values[column] = weightOfForm<kFalloff>(hn::Add(hn::Mul(hn::Add(hn::Mul(a, dx), bdy), dx), cdy2), slope);
         }
         sum = hn::Add(sum, values[column]);
         hn::StoreU(values[column], kTag, batch.weight[row * kNodes + column] + lane);

@@ -61,7 +61,7 @@ bool cover(const Extent& extent, const GridShape& shape, GridPatch& patch) {
 double halfWidth(double radius, double z, double slope, const GridShape& shape) {
   const double cells = radius / (shape.resolution.cell * z), square = cells * cells;
   if (!(square > shape.weights.tentBelow)) return 1;
-  const double wide = shape.weights.support * shape.weights.narrowed(square);
+  const double wide = shape.weights.supported(shape.weights.narrowed(square));
   return std::max(std::sqrt(wide * (1 + slope * slope)), 1.0);
 }
 

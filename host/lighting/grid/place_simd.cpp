@@ -34,6 +34,11 @@ HWY_INLINE Vec along(Vec x, Vec y, Vec z, const dvec3& axis) {
   return hn::Add(hn::Add(hn::Mul(x, set(axis.x)), hn::Mul(y, set(axis.y))), hn::Mul(z, set(axis.z)));
 }
 HWY_INLINE Vec square(Vec x) { return hn::Mul(x, x); }
+/// KernelWeights::supported.
+HWY_INLINE Vec supported(const KernelWeights& weights, Vec narrowed) {
+  const Vec whole = hn::Sub(narrowed, hn::Mul(set(weights.margin), hn::Sqrt(narrowed)));
+  return hn::Max(hn::Mul(set(weights.leastSupport), narrowed), whole);
+}
 
 // ---- locate
 
@@ -95,7 +100,7 @@ void locateAll(const LocatePoints& points, const GridShape& shape, double* keys,
     const Vec final = hn::IfThenElse(at.nowhere, set(kNoTile), key);
     // How far a kernel's nodes reach, on the face of the centre.
     const Vec cells2 = square(hn::Div(hn::Mul(r, perCell), at.z));
-    Vec wide = hn::Sqrt(hn::Mul(set(shape.weights.support), hn::Sub(hn::Max(cells2, tentBelow), narrowing)));
+    Vec wide = hn::Sqrt(supported(shape.weights, hn::Sub(hn::Max(cells2, tentBelow), narrowing)));
     if (perspective) wide = hn::Mul(wide, hn::Sqrt(hn::Add(one, hn::Max(square(at.u), square(at.v)))));
     const Vec reach = hn::IfThenElse(hn::Gt(cells2, tentBelow), wide, one);
     const Vec inX = hn::Sub(x, hn::Mul(column, set(size))), inY = hn::Sub(y, hn::Mul(row, set(size)));
@@ -191,7 +196,7 @@ void placeKernels(GridTile& tile) {
   const KernelWeights& weights = tile.shape->weights;
   const Vec perCell = set(1 / tile.shape->resolution.cell), perBin = set(1 / tile.bin), base = set(tile.depthBase);
   const Vec zero = hn::Zero(kTag), one = set(1), mass = set(kPi * moments.mass);
-  const Vec tentBelow = set(weights.tentBelow), narrowing = set(weights.narrowing), support = set(weights.support);
+  const Vec tentBelow = set(weights.tentBelow), narrowing = set(weights.narrowing);
   for (std::size_t i = 0; i < to.points.count; i += lanes()) {
     const InFrame at = placeInFrame(tile, to.points, i);
     const Vec r = widen(to.radius.at(i));
@@ -211,8 +216,8 @@ void placeKernels(GridTile& tile) {
                                      hn::Gt(at.z, hn::Mul(set(kLeastCosine / 2), at.depth))));
     }
     const Vec narrowed = hn::Sub(hn::Max(square(cells), tentBelow), narrowing);
-    const Vec wide = hn::Mul(hn::Sqrt(hn::Mul(support, narrowed)), reach);
-    Vec half = hn::IfThenElse(hn::Gt(square(cells), tentBelow), wide, one);
+    const Vec support = supported(weights, narrowed);
+    Vec half = hn::IfThenElse(hn::Gt(square(cells), tentBelow), hn::Mul(hn::Sqrt(support), reach), one);
     Vec total = hn::Mul(hn::Mul(mass, square(cells)), stretch), curved = zero;
     if (perspective) {
       const Mask bent = hn::And(shown, hn::Lt(at.depth, hn::Mul(set(kCurvedRadii), r)));
@@ -227,6 +232,7 @@ void placeKernels(GridTile& tile) {
     store(half, &to.half[i]), store(hn::IfThenElseZero(shown, curved), &to.curved[i]);
     store(hn::Div(formA, narrowed), &to.a[i]), store(hn::Div(formB, narrowed), &to.b[i]);
     store(hn::Div(formC, narrowed), &to.c[i]), store(total, &to.mass[i]);
+    store(hn::Div(narrowed, support), &to.slope[i]);
     store(depth, &to.depth[i]), store(radius, &to.depthRadius[i]);
     storeBin(hn::Sub(depth, radius), &to.firstBin[i]), storeBin(hn::Add(depth, radius), &to.lastBin[i]);
   }

@@ -222,9 +222,9 @@ KernelMoments kernelMoments(layout::uint falloff) {
 
 KernelWeights kernelWeights(layout::uint falloff) {
   switch (falloff) {
-    case layout::kFalloffLinear: return {1.9, 0.65, 1};
-    case layout::kFalloffSphere: return {1.4, 0.4, 1};
-    default: return {2.25, 0.73, layout::kGridSmoothSupport};
+    case layout::kFalloffLinear: return {1.9, 0.65, 1, 0};
+    case layout::kFalloffSphere: return {1.4, 0.4, 1, 0};
+    default: return {2.25, 0.73, layout::kGridSmoothSupport, layout::kGridSmoothMargin};
   }
 }
 
@@ -245,7 +245,7 @@ NodeRange curvedNodeRange(const dvec3& centre, double radius, const LightFrame& 
 NodeRange nodeRange(const dvec3& centre, double radius, const LightFrame& face, const GridShape& shape) {
   const double cell = shape.resolution.cell, z = face.perspective ? glm::dot(centre, face.axis) : 1;
   const double cells = radius / (z * cell), square = cells * cells;
-  const double support = std::sqrt(shape.weights.support * shape.weights.narrowed(square));
+  const double support = std::sqrt(shape.weights.supported(shape.weights.narrowed(square)));
   if (face.perspective && glm::length(centre) < kCurvedRadii * radius)
     return curvedNodeRange(centre, support * z * cell, face, cell);
   const dvec2 place(glm::dot(centre, face.u) / z, glm::dot(centre, face.v) / z);

@@ -1,6 +1,7 @@
 // Which tiles a light grid has, and what belongs to each (light_grid.h).
 #pragma once
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -25,15 +26,20 @@ KernelMoments kernelMoments(layout::uint falloff);
 /// How a kernel is put down on nodes, so that what receivers find between them comes nearest to it. Interpolation
 /// widens it by a tent over a cell, so it is put down narrower. The margin of a smooth kernel, where F(q) is small, is
 /// left out: its nodes are better spent on a finer grid. There weights are F(q) or the line that meets it at q = 0 and
-/// is 0 at `support`, whichever is less. All of it is chosen for the least mean square over the plane, of which
-/// tools/bench/fit_grid_kernels.py has the numbers: up to five nodes across, within 18 % of the best weights on as
-/// many.
+/// is 0 at the support, whichever is less. On a finer grid the margin is a smaller share of the kernel, and weights
+/// become F(q). All of it is chosen for the least mean square over the plane, of which tools/bench/fit_grid_kernels.py
+/// has the numbers: up to seven nodes across, within 18 % of the best weights on as many.
 struct KernelWeights {
   double tentBelow;  ///< the square of the radius [cells²] up to which it is a tent, on the four nodes about its centre
   double narrowing;  ///< taken from the square of the radius [cells²]
-  double support;    ///< q from which on weights are 0
+  double leastSupport;
+  double margin;  ///< [cells]
   /// The square of the radius that q = 1 has when it is put down [cells²].
   double narrowed(double square) const { return std::max(square, tentBelow) - narrowing; }
+  /// The square of the radius where weights become 0 [cells²], for one that is narrowed.
+  double supported(double narrowed) const {
+    return std::max(leastSupport * narrowed, narrowed - margin * std::sqrt(narrowed));
+  }
 };
 KernelWeights kernelWeights(layout::uint falloff);
 

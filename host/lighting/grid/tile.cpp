@@ -109,7 +109,7 @@ void GridPoints::lend(const Octree& tree, std::size_t begin) {
 
 void GridParticles::resize(std::size_t size) {
   points.resize(size);
-  for (auto* array : {&half, &a, &b, &c, &mass, &depth, &depthRadius, &curved, &own}) growTo(*array, size);
+  for (auto* array : {&half, &a, &b, &c, &mass, &slope, &depth, &depthRadius, &curved, &own}) growTo(*array, size);
   growTo(firstBin, size), growTo(lastBin, size);
 }
 

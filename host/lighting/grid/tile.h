@@ -71,6 +71,8 @@ struct GridParticles {
   std::vector<float> half;
   /// q = a·Δx² + b·Δx·Δy + c·Δy² in nodes; `mass` is the integral of F in cells.
   std::vector<float> a, b, c, mass;
+  /// 1 / the q from which on weights are 0 (KernelWeights).
+  std::vector<float> slope;
   /// In bins: of the kernel's middle, the centre less the mean sag over the kernel (column.h), and the radius.
   std::vector<float> depth, depthRadius;
   std::vector<std::int32_t> firstBin, lastBin;
@@ -161,7 +163,7 @@ inline int windowOf(const GridParticles& p, std::size_t i) {
 inline float reachOf(const GridParticles& p, std::size_t i, int window) {
   if (window == 2) return 1;
   if (window != kAlone) return p.half[i];
-  return std::sqrt(std::max(p.a[i], p.c[i]) / (p.a[i] * p.c[i] - 0.25f * (p.b[i] * p.b[i])));
+  return std::sqrt(std::max(p.a[i], p.c[i]) / (p.slope[i] * (p.a[i] * p.c[i] - 0.25f * (p.b[i] * p.b[i]))));
 }
 
 /// Of a particle that goes alone: the nodes that its kernel covers, whether the tile has them or not, what its weights

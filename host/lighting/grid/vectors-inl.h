@@ -55,12 +55,11 @@ HWY_INLINE void addTo(float* to, float weight, const Group& shares) {
   }
 }
 
-/// Weights of a quadratic form, which rounding may have taken below 0 (KernelWeights).
+/// Weights of a quadratic form, which rounding may have taken below 0 (KernelWeights). `slope`: GridParticles::slope.
 template <layout::uint kFalloff>
-HWY_INLINE Vec weightOfForm(Vec q) {
+HWY_INLINE Vec weightOfForm(Vec q, Vec slope) {
   if constexpr (kFalloff == layout::kFalloffSmooth) {
-    constexpr float kSlope = 1 / layout::kGridSmoothSupport;
-    const Vec u = hn::Sub(set(1), q), line = hn::Sub(hn::Mul(set(kSlope), u), set(kSlope - 1));
+    const Vec u = hn::Sub(set(1), q), line = hn::Sub(hn::Mul(slope, u), hn::Sub(slope, set(1)));
     return hn::Max(hn::Min(hn::Mul(u, u), line), hn::Zero(kTag));
   }
   if constexpr (kFalloff == layout::kFalloffLinear) q = hn::Max(q, hn::Zero(kTag));

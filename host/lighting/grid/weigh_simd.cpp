@@ -40,11 +40,11 @@ HWY_NOINLINE void weighAll(GridTile& tile, float* scales) {
     for (std::size_t lane = 0; lane < kGridBatch; lane += kLanes) {
       const std::size_t i = first + lane;
       const Vec x = load(&p.points.x[i]), y = load(&p.points.y[i]), one = set(1), zero = hn::Zero(kTag);
-      const Vec a = load(&p.a[i]), b = load(&p.b[i]), c = load(&p.c[i]);
+      const Vec a = load(&p.a[i]), b = load(&p.b[i]), c = load(&p.c[i]), slope = load(&p.slope[i]);
       const auto tent = hn::Gt(load(window.tent + lane), zero);
       const auto weight = [&](Vec dx, Vec dy) {
         const Vec q = hn::Add(hn::Mul(hn::Add(hn::Mul(a, dx), hn::Mul(b, dy)), dx), hn::Mul(c, hn::Mul(dy, dy)));
-        return weightOfForm<kFalloff>(q);
+        return weightOfForm<kFalloff>(q, slope);
       };
       const Vec intoX = hn::Sub(x, hn::Floor(x)), intoY = hn::Sub(y, hn::Floor(y));
       Vec sum = one;  // of a tent

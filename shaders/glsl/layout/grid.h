@@ -14,8 +14,9 @@ MOTE_CONST uint kBlockBins = 4u;
 MOTE_CONST uint kBlockPairs = 64u;
 MOTE_CONST uint kTileBlocks = 9u;    // along the edge of a tile of 33 nodes
 
-// Weights of the smooth falloff end here, sooner than F(q) (KernelWeights in host/lighting/grid/plan.h).
+// Weights of the smooth falloff end at this q, or so many cells sooner than F(q) (KernelWeights in host/lighting/grid/plan.h).
 MOTE_CONST float kGridSmoothSupport = 0.75f;
+MOTE_CONST float kGridSmoothMargin = 0.72f;
 
 // A particle's kernel: weights F(q) with q = a·Δx² + b·Δx·Δy + c·Δy² in nodes. Where c is 0 it is a tent over a cell.
 // Where it is −1 the light is near, and q = a · (Δx² + Δy² + (Δx·v − Δy·u)²) / n with (u, v) of the node, n = 1 + u² + v².
