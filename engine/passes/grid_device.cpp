@@ -13,6 +13,8 @@ namespace {
 /// Of all arrays of a batch of several tiles.
 constexpr std::uint64_t kBatchBytes = std::uint64_t{64} << 20;
 
+constexpr std::uint32_t kKernelTexelBytes = 16;  // half a GridKernel
+
 /// A buffer's elements to be filled: where it is mapped they are the buffer's own, else they are copied at the end.
 template <class T>
 class Filling {
@@ -53,7 +55,8 @@ const ComputePipeline& GridDevice::fill(const FillVariant& variant) {
                                                                               {4, has(kCurvedKernels)},
                                                                               {5, variant.goesOn},
                                                                               {6, storeLanes_},
-                                                                              {7, variant.colours}}});
+                                                                              {7, variant.colours}}},
+                                       2);
   return made;
 }
 
@@ -76,10 +79,20 @@ GridDevice::Sizes GridDevice::sizesOf(const GridCounts& counts, const Manner& ma
           manner.channels * counts.receivers * kFloat};
 }
 
+void GridDevice::release() {
+  kernelTexels_ = {}, entryTexels_ = {};
+  buffers_ = {};
+}
+
+bool GridDevice::texelsFit(const Sizes& sizes) const {
+  return sizes[0] / kKernelTexelBytes <= device_.mostTexels() &&
+         sizes[2] / sizeof(layout::uint) <= device_.mostTexels();
+}
+
 bool GridDevice::fits(const Sizes& sizes) {
   std::uint64_t own = 0;
   for (const Buffer* held : buffers_.all()) own += device_.bufferCost(held->size());
-  if (*std::max_element(sizes.begin(), sizes.end()) > device_.maxBufferBytes()) return false;
+  if (*std::max_element(sizes.begin(), sizes.end()) > device_.maxBufferBytes() || !texelsFit(sizes)) return false;
   return arraysCost(device_, {sizes.begin(), sizes.end()}) + device_.stagingCost() <= device_.budget().room() + own;
 }
 
@@ -92,10 +105,12 @@ void GridDevice::makeRoom(const Sizes& sizes) {
     room[k] = std::max<std::uint64_t>(buffers[k]->size(), sizes[k] + sizes[k] / 8);
   }
   if (enough) return;
-  buffers_ = {};
+  release();
   // More where that fits: batches differ, and so few of them make the buffers anew.
   if (!arraysFit(device_, {room.begin(), room.end()}, device_.stagingCost())) room = sizes;
   for (std::size_t k = 0; k < sizes.size(); ++k) *buffers[k] = device_.createBuffer(room[k]);
+  kernelTexels_ = device_.createTexelView(buffers_.kernels, VK_FORMAT_R32G32B32A32_SFLOAT, kKernelTexelBytes);
+  entryTexels_ = device_.createTexelView(buffers_.entries, VK_FORMAT_R32_UINT, sizeof(layout::uint));
   device_.upload<layout::GridPair>(buffers_.stored, std::vector<layout::GridPair>(layout::kBlockPairs));
 }
 
@@ -125,8 +140,7 @@ std::vector<GridArrays::Pieces> GridDevice::upload(std::span<const GridArrays* c
 layout::GridParams GridDevice::params(double cell) const {
   const Buffers& from = buffers_;
   layout::GridParams params{};
-  params.kernels = from.kernels.address(), params.peaks = from.peaks.address();
-  params.entries = from.entries.address(), params.blocks = from.blocks.address();
+  params.peaks = from.peaks.address(), params.blocks = from.blocks.address();
   params.stored = from.stored.address(), params.table = from.table.address();
   params.receivers = from.receivers.address(), params.depths = from.depths.address();
   params.cell = static_cast<float>(cell);
@@ -142,8 +156,9 @@ void GridDevice::fillNodes(CommandBuffer& commands, std::span<const GridArrays::
     if (pieces.key.round != round) commands.barrier(barrier::computeToCompute);
     round = pieces.key.round;
     params.count = static_cast<layout::uint>(pieces.strands.size());
-    commands.dispatchRow(fill({manner.falloff, pieces.key.kinds, pieces.key.goesOn, manner.colours}), params,
-                         (pieces.strands.size() + eachGroup - 1) / eachGroup);
+    const ComputePipeline& pipeline = fill({manner.falloff, pieces.key.kinds, pieces.key.goesOn, manner.colours});
+    commands.bindTexels(pipeline, {kernelTexels_.handle(), entryTexels_.handle()});
+    commands.dispatchRow(pipeline, params, (pieces.strands.size() + eachGroup - 1) / eachGroup);
     params.strands += pieces.strands.size() * sizeof(layout::GridStrand);
   }
 }
@@ -204,9 +219,10 @@ std::vector<float> GridDevice::runInParts(const GridArrays& tile, const Manner& 
     const Sizes of = sizes(share);
     return std::vector<std::uint64_t>(of.begin(), of.end());
   };
-  buffers_ = {};
-  const std::uint64_t share = partThatFits(device_, kShares, 0, arrays, device_.stagingCost(),
-                                           "particles and receivers of a tile of the light grid");
+  release();
+  std::uint64_t share = partThatFits(device_, kShares, 0, arrays, device_.stagingCost(),
+                                     "particles and receivers of a tile of the light grid");
+  while (share > 0 && !texelsFit(sizes(share))) share /= 2;
   makeRoom(sizes(share));  // for all parts: what is stored must stay
   std::vector<float> depths(manner.channels * all.receivers);
   GridArrays part;

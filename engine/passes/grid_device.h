@@ -34,7 +34,7 @@ class GridDevice {
   /// Device seconds so far, from timestamps.
   double seconds() const { return seconds_; }
   /// Gives all buffers back to the budget.
-  void release() { buffers_ = {}; }
+  void release();
 
  private:
   struct FillVariant {
@@ -57,6 +57,8 @@ class GridDevice {
   static Sizes sizesOf(const GridCounts& counts, const Manner& manner);
   static Sizes sum(const Sizes& a, const Sizes& b);
   bool fits(const Sizes& sizes);
+  /// Whether texel views can be as long as what is read through them.
+  bool texelsFit(const Sizes& sizes) const;
   void makeRoom(const Sizes& sizes);
   /// The steps of `run`: arrays to the device, what all dispatches are told, and one channel's nodes.
   std::vector<GridArrays::Pieces> upload(std::span<const GridArrays* const> tiles, const Sizes& sizes,
@@ -71,6 +73,7 @@ class GridDevice {
   std::map<FillVariant, ComputePipeline> fills_;
   ComputePipeline read_;
   Buffers buffers_;
+  TexelView kernelTexels_, entryTexels_;  // of buffers_, so they go before them
   double seconds_ = 0;
 };
 

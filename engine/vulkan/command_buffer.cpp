@@ -89,6 +89,21 @@ void CommandBuffer::copy(const Buffer& from, VkDeviceSize fromOffset, const Buff
   vkCmdCopyBuffer(commands_, from.handle(), to.handle(), 1, &region);
 }
 
+void CommandBuffer::bindTexels(const ComputePipeline& pipeline, std::initializer_list<VkBufferView> views) {
+  MOTE_CHECK(views.size(), ==, pipeline.texelViews());
+  std::vector<VkWriteDescriptorSet> writes;
+  for (const VkBufferView& view : views) {
+    auto write = structure<VkWriteDescriptorSet>(VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET);
+    write.dstBinding = static_cast<std::uint32_t>(writes.size());
+    write.descriptorCount = 1;
+    write.descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
+    write.pTexelBufferView = &view;
+    writes.push_back(write);
+  }
+  vkCmdPushDescriptorSetKHR(commands_, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.layout(), 0,
+                            static_cast<std::uint32_t>(writes.size()), writes.data());
+}
+
 void CommandBuffer::dispatchBytes(const ComputePipeline& pipeline, const void* params, std::size_t bytes,
                                   std::uint32_t x, std::uint32_t y, std::uint32_t z) {
   MOTE_CHECK(bytes, ==, pipeline.pushConstantBytes());

@@ -11,6 +11,7 @@
 #include "engine/vulkan/compute_pipeline.h"
 #include "engine/vulkan/graphics_pipeline.h"
 #include "engine/vulkan/image.h"
+#include "engine/vulkan/texel_view.h"
 
 namespace mote {
 
@@ -36,6 +37,8 @@ class CommandBuffer {
   void fill(const Buffer& buffer, std::uint32_t word, VkDeviceSize offset, VkDeviceSize bytes);
   void copy(const Buffer& from, VkDeviceSize fromOffset, const Buffer& to, VkDeviceSize toOffset, VkDeviceSize bytes);
 
+  /// What the dispatches of pipelines with as many texel views read from now on, binding by binding.
+  void bindTexels(const ComputePipeline& pipeline, std::initializer_list<VkBufferView> views);
   /// Runs groups.x × y × z workgroups; `params` is the shader's push constant block, of exactly its size.
   template <class Params>
   void dispatch(const ComputePipeline& pipeline, const Params& params, std::uint32_t x, std::uint32_t y = 1,

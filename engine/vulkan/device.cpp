@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "engine/vulkan/check.h"
+#include "engine/vulkan/physical_device.h"
 #include "engine/vulkan/structure.h"
 #include "host/core/error.h"
 
@@ -59,6 +60,8 @@ VkDevice createLogicalDevice(VkPhysicalDevice physicalDevice, std::uint32_t queu
   info.pNext = &features;
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queue;
+  info.enabledExtensionCount = static_cast<std::uint32_t>(kDeviceExtensions.size());
+  info.ppEnabledExtensionNames = kDeviceExtensions.data();
   VkDevice device = VK_NULL_HANDLE;
   vkCheck(vkCreateDevice(physicalDevice, &info, nullptr, &device), "vkCreateDevice");
   return device;
@@ -72,8 +75,8 @@ VkBufferCreateInfo bufferInfo(VkDeviceSize bytes) {
   info.size = std::max<VkDeviceSize>(bytes, 16);  // a buffer of 0 bytes does not exist in Vulkan, but an array does
   info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT |
                VK_BUFFER_USAGE_INDEX_BUFFER_BIT | VK_BUFFER_USAGE_VERTEX_BUFFER_BIT |
-               VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
-               VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+               VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT |
+               VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
   return info;
 }
 
@@ -257,6 +260,18 @@ Buffer Device::createBuffer(VkDeviceSize bytes, Memory memory) const {
   address.buffer = buffer.handle();
   buffer.address_ = vkGetBufferDeviceAddress(device_, &address);
   return buffer;
+}
+
+TexelView Device::createTexelView(const Buffer& buffer, VkFormat format, std::uint32_t elementBytes) const {
+  TexelView view;
+  view.view_ = DeviceHandle<VkBufferView, &vkDestroyBufferView>(device_);
+  auto info = structure<VkBufferViewCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO);
+  info.buffer = buffer.handle();
+  info.format = format;
+  info.range = std::min(std::max<std::uint64_t>(buffer.size() / elementBytes, 1), mostTexels()) * elementBytes;
+  vkCheck(vkCreateBufferView(device_, &info, nullptr, view.view_.out()), "vkCreateBufferView",
+          fmt::format("{} bytes", info.range));
+  return view;
 }
 
 Image2D Device::createImage(std::uint32_t width, std::uint32_t height, VkFormat format) const {

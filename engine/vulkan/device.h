@@ -15,6 +15,7 @@
 #include "engine/vulkan/graphics_pipeline.h"
 #include "engine/vulkan/image.h"
 #include "engine/vulkan/shader_module.h"
+#include "engine/vulkan/texel_view.h"
 #include "engine/vulkan/timestamp_queries.h"
 
 namespace mote {
@@ -47,6 +48,8 @@ class Device {
   const VkPhysicalDeviceLimits& limits() const { return limits_; }
   /// Largest buffer that can be made [bytes]; a bigger array must be streamed in parts.
   std::uint64_t maxBufferBytes() const;
+  /// Elements of the longest texel view.
+  std::uint64_t mostTexels() const { return limits_.maxTexelBufferElements; }
   /// Size of the device-local heap [bytes].
   std::uint64_t memoryBytes() const;
 
@@ -64,9 +67,12 @@ class Device {
   Buffer createBuffer(VkDeviceSize bytes, Memory memory = Memory::Device) const;
   /// Throws MachineError when larger than maxImageDimension2D or memory is short.
   Image2D createImage(std::uint32_t width, std::uint32_t height, VkFormat format) const;
+  /// The whole buffer, as far as it has whole elements of `elementBytes`, and not more than mostTexels of them.
+  TexelView createTexelView(const Buffer& buffer, VkFormat format, std::uint32_t elementBytes) const;
   ShaderModule createShaderModule(std::span<const std::uint32_t> spirv) const;
   ComputePipeline createComputePipeline(std::span<const std::uint32_t> spirv, std::uint32_t pushConstantBytes,
-                                        std::span<const SpecializationConstant> constants = {}) const;
+                                        std::span<const SpecializationConstant> constants = {},
+                                        std::uint32_t texelViews = 0) const;
   GraphicsPipeline createGraphicsPipeline(const GraphicsPipelineInfo& info) const;
   TimestampQueries createTimestampQueries(std::uint32_t spans) const;
 
@@ -108,7 +114,8 @@ class Device {
   Buffer stagingBuffer(std::uint64_t bytes) const;
   DeviceMemory allocate(const VkMemoryRequirements& needs, std::uint32_t type, VkMemoryAllocateFlags flags,
                         const char* what) const;
-  void createLayout(VkShaderStageFlags stages, std::uint32_t pushConstantBytes, VkPipelineLayout* layout) const;
+  void createLayout(VkShaderStageFlags stages, std::uint32_t pushConstantBytes, VkPipelineLayout* layout,
+                    const VkDescriptorSetLayout* set = nullptr) const;
 
   VkPhysicalDevice physicalDevice_;
   bool stageAlways_;

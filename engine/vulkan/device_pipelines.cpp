@@ -39,6 +39,18 @@ VkPipelineShaderStageCreateInfo stage(VkShaderStageFlagBits bit, const ShaderMod
   return info;
 }
 
+/// Bindings 0, 1, … of texel views, pushed with the commands.
+void createTexelSet(VkDevice device, std::uint32_t texelViews, VkDescriptorSetLayout* set) {
+  std::vector<VkDescriptorSetLayoutBinding> bindings;
+  for (std::uint32_t k = 0; k < texelViews; ++k)
+    bindings.push_back({k, VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
+  auto info = structure<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
+  info.flags = VK_DESCRIPTOR_SET_LAYOUT_CREATE_PUSH_DESCRIPTOR_BIT_KHR;
+  info.bindingCount = texelViews;
+  info.pBindings = bindings.data();
+  vkCheck(vkCreateDescriptorSetLayout(device, &info, nullptr, set), "vkCreateDescriptorSetLayout");
+}
+
 }  // namespace
 
 ShaderModule Device::createShaderModule(std::span<const std::uint32_t> spirv) const {
@@ -52,23 +64,31 @@ ShaderModule Device::createShaderModule(std::span<const std::uint32_t> spirv) co
   return module;
 }
 
-void Device::createLayout(VkShaderStageFlags stages, std::uint32_t pushConstantBytes, VkPipelineLayout* layout) const {
+void Device::createLayout(VkShaderStageFlags stages, std::uint32_t pushConstantBytes, VkPipelineLayout* layout,
+                          const VkDescriptorSetLayout* set) const {
   MOTE_CHECK(pushConstantBytes, <=, kMaxPushConstantBytes);
   MOTE_CHECK(pushConstantBytes % 4, ==, 0u);
   const VkPushConstantRange range{stages, 0, pushConstantBytes};
   auto info = structure<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
   info.pushConstantRangeCount = pushConstantBytes > 0 ? 1 : 0;
   info.pPushConstantRanges = &range;
+  info.setLayoutCount = set ? 1 : 0;
+  info.pSetLayouts = set;
   vkCheck(vkCreatePipelineLayout(device_, &info, nullptr, layout), "vkCreatePipelineLayout");
 }
 
 ComputePipeline Device::createComputePipeline(std::span<const std::uint32_t> spirv, std::uint32_t pushConstantBytes,
-                                              std::span<const SpecializationConstant> constants) const {
+                                              std::span<const SpecializationConstant> constants,
+                                              std::uint32_t texelViews) const {
   ComputePipeline pipeline;
+  pipeline.set_ = DeviceHandle<VkDescriptorSetLayout, &vkDestroyDescriptorSetLayout>(device_);
   pipeline.layout_ = DeviceHandle<VkPipelineLayout, &vkDestroyPipelineLayout>(device_);
   pipeline.pipeline_ = DeviceHandle<VkPipeline, &vkDestroyPipeline>(device_);
   pipeline.pushConstantBytes_ = pushConstantBytes;
-  createLayout(VK_SHADER_STAGE_COMPUTE_BIT, pushConstantBytes, pipeline.layout_.out());
+  pipeline.texelViews_ = texelViews;
+  if (texelViews > 0) createTexelSet(device_, texelViews, pipeline.set_.out());
+  const VkDescriptorSetLayout set = pipeline.set_.get();
+  createLayout(VK_SHADER_STAGE_COMPUTE_BIT, pushConstantBytes, pipeline.layout_.out(), texelViews > 0 ? &set : nullptr);
 
   const ShaderModule module = createShaderModule(spirv);
   const SpecializationInfo specialization(constants);

@@ -74,6 +74,19 @@ void needFeatures(VkPhysicalDevice device, std::vector<std::string>& missing) {
   need(v13.maintenance4, "maintenance4");
 }
 
+void needExtensions(VkPhysicalDevice device, std::vector<std::string>& missing) {
+  std::uint32_t count = 0;
+  vkCheck(vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr),
+          "vkEnumerateDeviceExtensionProperties");
+  std::vector<VkExtensionProperties> there(count);
+  vkCheck(vkEnumerateDeviceExtensionProperties(device, nullptr, &count, there.data()),
+          "vkEnumerateDeviceExtensionProperties");
+  for (const char* needed : kDeviceExtensions)
+    if (std::none_of(there.begin(), there.end(),
+                     [&](const VkExtensionProperties& e) { return std::string_view(e.extensionName) == needed; }))
+      missing.push_back(fmt::format("extension {}", needed));
+}
+
 void needSubgroups(VkPhysicalDevice device, std::vector<std::string>& missing) {
   auto subgroups = structure<VkPhysicalDeviceSubgroupProperties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES);
   auto properties = structure<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
@@ -132,6 +145,7 @@ DeviceReport report(VkPhysicalDevice device) {
   vkGetPhysicalDeviceProperties2(device, &more);
   r.driver = fmt::format("{} {}", driver.driverName, driver.driverInfo);
   needFeatures(device, r.missing);
+  needExtensions(device, r.missing);
   const std::vector<std::string> limits = missingLimits(properties.limits);
   r.missing.insert(r.missing.end(), limits.begin(), limits.end());
   needSubgroups(device, r.missing);
@@ -185,6 +199,7 @@ std::vector<std::string> missingLimits(const VkPhysicalDeviceLimits& limits) {
   need(limits.maxComputeWorkGroupSize[0], 64, "maxComputeWorkGroupSize[0]");
   need(limits.maxColorAttachments, 2, "maxColorAttachments");
   need(limits.maxGeometryOutputVertices, 4, "maxGeometryOutputVertices");
+  need(limits.maxTexelBufferElements, 1 << 22, "maxTexelBufferElements");  // of GridDevice: 64 MiB of kernels
   if (!limits.timestampComputeAndGraphics) missing.push_back("limit timestampComputeAndGraphics");
   return missing;
 }

@@ -2,6 +2,7 @@
 #pragma once
 #include <volk.h>
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -9,6 +10,9 @@
 namespace mote {
 
 class Instance;
+
+/// What is asked of a device beyond Vulkan 1.3.
+inline constexpr std::array kDeviceExtensions{VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME};
 
 /// One device as `mote devices` prints it.
 struct DeviceReport {

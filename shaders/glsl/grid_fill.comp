@@ -1,18 +1,21 @@
 // Puts kernels down on the light grid and sums along the depth: one subgroup a strand, all groups of bins over 4 × 4 nodes.
 //
-// A lane takes a particle of its own to all 16 nodes and 4 bins; the 64 sums stay in its registers until the block's
+// A lane takes two particles at a time to all 16 nodes and 4 bins; the 64 sums stay in its registers until the block's
 // particles are through. Then they are added up over the lanes, always in the same order, and on what the blocks before
 // left. So a particle is loaded once for 64 multiply-adds, stores are side by side, and there is no atomic nor barrier.
 //
-// On lavapipe (Mesa 22.3) a load inside of a loop takes about 90 instructions for each component of a subgroup, which is
-// why a block is that large; loops over nodes and bins must unroll, or the sums live in memory.
+// On lavapipe (Mesa 22.3) what is loaded inside of a loop costs most, which is why a block is that large, and why kernels
+// come as texels (texel_view.h); loops over nodes and bins must unroll, or the sums live in memory.
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_EXT_control_flow_attributes : require
 #include "lib/grid.glsl"
 
+layout(binding = 0) uniform textureBuffer kernels;   // GridKernel, two texels each
+layout(binding = 1) uniform utextureBuffer entries;  // numbers of kernels, block after block
 layout(constant_id = 1) const uint kFalloff = 0;
 layout(constant_id = 2) const bool kTents = true;     // there may be kernels that are tents …
 layout(constant_id = 3) const bool kEllipses = true;  // … or have a falloff on the light's plane …
@@ -27,12 +30,12 @@ layout(constant_id = 7) const bool kColours = false;
 float weightOfForm(float q, float slope) {
   if (kFalloff == kFalloffLinear || kFalloff == kFalloffSphere) return falloff(q, kFalloff);
   const float u = 1.0 - q;
-  return max(min(u * u, slope * u - (slope - 1.0)), 0.0);
+  return max(min(u * u, 1.0 - slope * q), 0.0);
 }
 
 const uint kChunks = kBlockNodes / kStoreLanes;
 const uint kMostChunks = kBlockNodes;
-const uint kKernelPairs = 4;  // of a GridKernel
+const uint kTurn = 2;  // particles of a lane at once: lavapipe selects what a loop carries anew each time
 
 float sum[kBlockNodes * kBlockBins];  // of the lane's particles, [bin][row][column]
 float carry[kMostChunks];             // the lane's nodes of each chunk: what lies before the block
@@ -63,32 +66,39 @@ float weightAt(GridKernel p, float slope, float dx, float dy, float bdy, float c
   return kTents && p.c == 0.0 ? tent : value;
 }
 
-/// Only what the variant needs: each load costs.
-GridKernel kernelAt(uint i) {
-  WordPairBuffer words = WordPairBuffer(params.kernels);
-  const uint first = i * kKernelPairs;
-  const vec2 xy = loadFloats(words, first), along = loadFloats(words, first + 1), c = loadFloats(words, first + 3);
-  const vec2 ab = kEllipses || kCurved ? loadFloats(words, first + 2) : vec2(0);
-  const float scale = kColours ? c.y * params.peaks.at[i] : c.y;
-  return GridKernel(xy.x, xy.y, along.x, along.y, ab.x, ab.y, c.x, scale);
+GridKernel kernelAt(int i) {
+  const vec4 place = texelFetch(kernels, 2 * i), form = texelFetch(kernels, 2 * i + 1);
+  const float scale = kColours ? form.w * params.peaks.at[i] : form.w;
+  return GridKernel(place.x, place.y, place.z, place.w, form.x, form.y, form.z, scale);
 }
 
-void addParticle(GridKernel p, GridStrand strand, float bin) {
-  const float slope = slopeOf(p);
-  float share[kBlockBins];
-  float before = depthShare((bin - p.depth) * p.inverseRadius);
-  [[unroll]] for (uint k = 0; k < kBlockBins; ++k) {
-    const float after = depthShare((bin + float(k + 1) - p.depth) * p.inverseRadius);
-    share[k] = p.scale * (after - before);
-    before = after;
+void addParticles(GridKernel all[kTurn], GridStrand strand, float bin) {
+  float share[kTurn][kBlockBins], slope[kTurn];
+  [[unroll]] for (uint t = 0; t < kTurn; ++t) {
+    const GridKernel p = all[t];
+    slope[t] = slopeOf(p);
+    float before = depthShare((bin - p.depth) * p.inverseRadius);
+    [[unroll]] for (uint k = 0; k < kBlockBins; ++k) {
+      const float after = depthShare((bin + float(k + 1) - p.depth) * p.inverseRadius);
+      share[t][k] = p.scale * (after - before);
+      before = after;
+    }
   }
   [[unroll]] for (uint r = 0; r < kBlockEdge; ++r) {
-    const float dy = (strand.row + float(r)) - p.y, bdy = p.b * dy, cdy2 = p.c * (dy * dy);
     [[unroll]] for (uint c = 0; c < kBlockEdge; ++c) {
-      const float dx = (strand.column + float(c)) - p.x;
       const vec2 uv = vec2(strand.u + float(c) * params.cell, strand.v + float(r) * params.cell);
-      const float at = weightAt(p, slope, dx, dy, bdy, cdy2, uv);
-      [[unroll]] for (uint k = 0; k < kBlockBins; ++k) sum[(k * kBlockEdge + r) * kBlockEdge + c] += at * share[k];
+      float at[kTurn];
+      [[unroll]] for (uint t = 0; t < kTurn; ++t) {
+        const GridKernel p = all[t];
+        const float dy = (strand.row + float(r)) - p.y, bdy = p.b * dy, cdy2 = p.c * (dy * dy);
+        const float dx = (strand.column + float(c)) - p.x;
+        at[t] = weightAt(p, slope[t], dx, dy, bdy, cdy2, uv);
+      }
+      [[unroll]] for (uint k = 0; k < kBlockBins; ++k) {
+        float more = at[0] * share[0][k];
+        [[unroll]] for (uint t = 1; t < kTurn; ++t) more += at[t] * share[t][k];
+        sum[(k * kBlockEdge + r) * kBlockEdge + c] += more;
+      }
     }
   }
 }
@@ -130,11 +140,13 @@ void main() {
     const uint last = block.end - 1;
     uint begin = block.first;
     do {
-      const uint i = params.entries.at[min(at, last)];
-      GridKernel kernel = kernelAt(i);
-      kernel.scale = at <= last ? kernel.scale : 0.0;
-      addParticle(kernel, strand, block.bin);
-      at += gl_SubgroupSize, begin += gl_SubgroupSize;
+      GridKernel all[kTurn];
+      [[unroll]] for (uint t = 0; t < kTurn; ++t) {
+        all[t] = kernelAt(int(texelFetch(entries, int(min(at, last))).x));
+        all[t].scale = at <= last ? all[t].scale : 0.0;
+        at += gl_SubgroupSize, begin += gl_SubgroupSize;
+      }
+      addParticles(all, strand, block.bin);
     } while (begin <= last);
     storeBlock(block.stored, b == strand.first);
     ++b;

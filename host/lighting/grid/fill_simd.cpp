@@ -160,6 +160,8 @@ HWY_NOINLINE void fillAll(GridTile& tile) {
     if (any[6]) fillBatch<kFalloff, 6>(tile, first, window, batch);
     if (any[7]) fillBatch<kFalloff, 7>(tile, first, window, batch);
     if (any[8]) fillBatch<kFalloff, 8>(tile, first, window, batch);
+    if (any[9]) fillBatch<kFalloff, 9>(tile, first, window, batch);
+    if (any[10]) fillBatch<kFalloff, 10>(tile, first, window, batch);
     if (any[0] || any[kAlone])
       for (std::size_t lane = 0; lane < count; ++lane) {
         if (window[lane] == 0) p.own[first + lane] = 0;

@@ -41,7 +41,7 @@ bool cover(const Extent& extent, const GridShape& shape, GridPatch& patch) {
   if (!(std::max(last.x - first.x, last.y - first.y) < 1 << 16)) return false;
   patch.firstColumn = first.x, patch.firstRow = first.y;
   patch.columns = static_cast<int>(last.x - first.x) + 1, patch.rows = static_cast<int>(last.y - first.y) + 1;
-  const double window = std::clamp(std::ceil(2 * extent.half * (1 + 1e-9)), 2.0, double(kMostWindow));
+  const double window = std::clamp(std::ceil(2 * extent.half), 2.0, double(kMostWindow));
   patch.margin = (static_cast<int>(window) - 1) / 2;
   // Kernels are put down a little before their centres (their mean sag, at most an eighth of a radius).
   const double before = 1.125 * extent.radius, behind = std::min(extent.radius, kMostBins * bin);
@@ -57,12 +57,13 @@ bool cover(const Extent& extent, const GridShape& shape, GridPatch& patch) {
   return true;
 }
 
-/// Half width of a kernel [cells] (placeParticles); an upper bound where `z` is a lower and `slope` an upper one.
+/// Half width of a kernel [cells] (placeParticles, in single precision); an upper bound where `z` is a lower and
+/// `slope` an upper one.
 double halfWidth(double radius, double z, double slope, const GridShape& shape) {
   const double cells = radius / (shape.resolution.cell * z), square = cells * cells;
   if (!(square > shape.weights.tentBelow)) return 1;
   const double wide = shape.weights.supported(shape.weights.narrowed(square));
-  return std::max(std::sqrt(wide * (1 + slope * slope)), 1.0);
+  return std::max(std::sqrt(wide * (1 + slope * slope)) * (1 + 1e-6), 1.0);
 }
 
 class Planner {

@@ -17,7 +17,7 @@ namespace mote {
 constexpr int kGroupBins = 4;
 /// Kernels on up to so many nodes across and up to so many groups of bins go a vector of particles at a time; others
 /// one by one.
-constexpr int kMostWindow = 8, kMostGroups = 2;
+constexpr int kMostWindow = 10, kMostGroups = 2;
 /// Nodes beyond a tile's on each side, so that such kernels need no clipping: a centre stands up to half a window
 /// outside, and its nodes as many from there.
 constexpr int kNodeMargin = kMostWindow;

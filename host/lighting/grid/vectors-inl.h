@@ -59,7 +59,7 @@ HWY_INLINE void addTo(float* to, float weight, const Group& shares) {
 template <layout::uint kFalloff>
 HWY_INLINE Vec weightOfForm(Vec q, Vec slope) {
   if constexpr (kFalloff == layout::kFalloffSmooth) {
-    const Vec u = hn::Sub(set(1), q), line = hn::Sub(hn::Mul(slope, u), hn::Sub(slope, set(1)));
+    const Vec u = hn::Sub(set(1), q), line = hn::Sub(set(1), hn::Mul(slope, q));
     return hn::Max(hn::Min(hn::Mul(u, u), line), hn::Zero(kTag));
   }
   if constexpr (kFalloff == layout::kFalloffLinear) q = hn::Max(q, hn::Zero(kTag));

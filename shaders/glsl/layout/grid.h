@@ -30,7 +30,6 @@ struct GridKernel {
   float c;
   float scale;          // of the weights: optical depth; with three channels for a peak of 1
 };
-MOTE_BUFFER(GridKernelBuffer, GridKernel)
 MOTE_ASSERT_OFFSET(GridKernel, x, 0);
 MOTE_ASSERT_OFFSET(GridKernel, y, 4);
 MOTE_ASSERT_OFFSET(GridKernel, depth, 8);
@@ -106,11 +105,9 @@ MOTE_ASSERT_OFFSET(GridReceiver, into, 8);
 MOTE_ASSERT_OFFSET(GridReceiver, place, 12);
 MOTE_ASSERT_SIZE(GridReceiver, 16);
 
-// One dispatch of grid_fill.comp or grid_read.comp, of one channel.
+// One dispatch of grid_fill.comp or grid_read.comp, of one channel. Kernels and their entries come as texel views.
 struct GridParams {
-  MOTE_ADDRESS(GridKernelBuffer) kernels;
   MOTE_ADDRESS(FloatBuffer) peaks;       // of the kernels: optical depth through the centre; three channels alone
-  MOTE_ADDRESS(UintBuffer) entries;      // numbers of kernels, block after block
   MOTE_ADDRESS(GridBlockBuffer) blocks;
   MOTE_ADDRESS(GridStrandBuffer) strands;
   MOTE_ADDRESS(GridPairBuffer) stored;   // kBlockPairs a block
@@ -120,18 +117,16 @@ struct GridParams {
   uint count;                            // of strands or receivers
   float cell;                            // [on the plane one unit from a point light]
 };
-MOTE_ASSERT_OFFSET(GridParams, kernels, 0);
-MOTE_ASSERT_OFFSET(GridParams, peaks, 8);
-MOTE_ASSERT_OFFSET(GridParams, entries, 16);
-MOTE_ASSERT_OFFSET(GridParams, blocks, 24);
-MOTE_ASSERT_OFFSET(GridParams, strands, 32);
-MOTE_ASSERT_OFFSET(GridParams, stored, 40);
-MOTE_ASSERT_OFFSET(GridParams, table, 48);
-MOTE_ASSERT_OFFSET(GridParams, receivers, 56);
-MOTE_ASSERT_OFFSET(GridParams, depths, 64);
-MOTE_ASSERT_OFFSET(GridParams, count, 72);
-MOTE_ASSERT_OFFSET(GridParams, cell, 76);
-MOTE_ASSERT_SIZE(GridParams, 80);
+MOTE_ASSERT_OFFSET(GridParams, peaks, 0);
+MOTE_ASSERT_OFFSET(GridParams, blocks, 8);
+MOTE_ASSERT_OFFSET(GridParams, strands, 16);
+MOTE_ASSERT_OFFSET(GridParams, stored, 24);
+MOTE_ASSERT_OFFSET(GridParams, table, 32);
+MOTE_ASSERT_OFFSET(GridParams, receivers, 40);
+MOTE_ASSERT_OFFSET(GridParams, depths, 48);
+MOTE_ASSERT_OFFSET(GridParams, count, 56);
+MOTE_ASSERT_OFFSET(GridParams, cell, 60);
+MOTE_ASSERT_SIZE(GridParams, 64);
 MOTE_LAYOUT_END
 
 #endif
