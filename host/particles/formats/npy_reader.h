@@ -1,5 +1,4 @@
-// Reads NPY files, version 1.0 to 3.0: what numpy.save writes (NumPy Enhancement Proposal 1, "A Simple File Format for
-// NumPy Arrays").
+// Reads NPY files, version 1.0 to 3.0: what numpy.save writes (npy_header.h).
 //
 // A structured array has a channel for each of its fields, with arity 3 for one of shape (3,); scalars that are a
 // vector by their names become one channel (component_names.h). A plain array of shape (N, 3) is Position, (N, 4)
@@ -8,10 +7,9 @@
 #include <cstddef>
 #include <span>
 #include <string>
-#include <vector>
 
-#include "host/particles/formats/component_names.h"
 #include "host/particles/formats/input_file.h"
+#include "host/particles/formats/npy_header.h"
 #include "host/particles/formats/particle_file.h"
 
 namespace mote {
@@ -28,15 +26,9 @@ class NpyReader : public ParticleFile {
   void read(std::span<const ChannelRequest> requests) const override;
 
  private:
-  struct Dtype;
-  void setChannels(const Dtype& dtype, std::span<const std::uint64_t> shape);
-
   InputFile file_;
-  std::vector<PlacedChannel> placed_;
-  std::size_t rowBytes_ = 0;
+  NpyTable table_;
   std::uint64_t dataBegin_ = 0;
-  bool bigEndian_ = false;
-  bool byColumns_ = false;  ///< Fortran's order: all first numbers, then all second ones …
 };
 
 }  // namespace mote
