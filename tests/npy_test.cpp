@@ -5,6 +5,7 @@
 
 #include "host/core/log.h"
 #include "host/particles/particle_loader.h"
+#include "tests/support/npy_bytes.h"
 #include "tests/support/opened_file.h"
 #include "tests/support/shared_data.h"
 
@@ -12,17 +13,6 @@ namespace mote {
 namespace {
 
 using namespace test;
-
-std::string npy(const std::string& dictionary, const std::string& data, int major = 1) {
-  std::string header = dictionary + "\n";
-  std::string out = std::string("\x93NUMPY", 6) + static_cast<char>(major) + '\0';
-  for (int k = 0; k < (major == 1 ? 2 : 4); ++k) out += static_cast<char>(header.size() >> (8 * k) & 0xff);
-  return out + header + data;
-}
-
-std::string dictionary(const std::string& descr, const std::string& shape, const std::string& fortran = "False") {
-  return "{'descr': " + descr + ", 'fortran_order': " + fortran + ", 'shape': " + shape + ", }";
-}
 
 const std::string kTwo = rawNumbers<float>({1, 2, 3, 4, 5, 6});
 

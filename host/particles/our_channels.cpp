@@ -37,14 +37,22 @@ bool isOurChannel(std::string_view name) {
   return std::any_of(std::begin(kChannels), std::end(kChannels), [&](const auto& c) { return c.ours == name; });
 }
 
+std::vector<std::string_view> namesInFiles(std::string_view ours) {
+  std::vector<std::string_view> names;
+  for (const OurChannel& channel : kChannels)
+    if (channel.ours == ours) {
+      names.push_back(channel.ours);
+      for (const std::string_view theirs : channel.theirs)
+        if (!theirs.empty()) names.push_back(theirs);
+    }
+  return names;
+}
+
 ChannelName nameInFile(const ParticleSource& source, const ParticleFile& file, const std::string& ours) {
   const auto asked = source.channels.find(ours);
   if (asked != source.channels.end()) return {asked->second, true};
-  if (!file.channel(ours))
-    for (const OurChannel& channel : kChannels)
-      if (channel.ours == ours)
-        for (const std::string_view theirs : channel.theirs)
-          if (!theirs.empty() && file.channel(theirs)) return {std::string(theirs), false};
+  for (const std::string_view name : namesInFiles(ours))
+    if (file.channel(name)) return {std::string(name), false};
   return {ours, false};
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "host/particles/formats/particle_file.h"
 #include "host/scene/scene.h"
@@ -11,6 +12,8 @@ namespace mote {
 /// "Position, Radius, Density …", for messages.
 std::string ourChannels();
 bool isOurChannel(std::string_view name);
+/// One of our channels, and the names that other programs give it, the most common first.
+std::vector<std::string_view> namesInFiles(std::string_view ours);
 
 /// The file's name for one of our channels, and whether the scene asked for it by name.
 struct ChannelName {

@@ -9,6 +9,7 @@
 #include "host/particles/formats/csv_reader.h"
 #include "host/particles/formats/input_file.h"
 #include "host/particles/formats/npy_reader.h"
+#include "host/particles/formats/npz_reader.h"
 #include "host/particles/formats/ply_reader.h"
 #include "host/particles/formats/prt2_reader.h"
 #include "host/particles/formats/prt_reader.h"
@@ -37,6 +38,7 @@ constexpr Format kFormats[] = {
     {"PRT 1.0 and 1.1", beginsAsPrt, open<PrtReader>},
     {"PRT 2 and SPRT", beginsAsPrt2, open<Prt2Reader>},
     {"NPY", beginsAsNpy, open<NpyReader>},
+    {"NPZ", beginsAsNpz, open<NpzReader>},
     {"PLY", beginsAsPly, open<PlyReader>},
     {"legacy VTK", beginsAsVtk, open<VtkReader>},
     {"classic BGEO", beginsAsBgeo, open<BgeoReader>, true},
