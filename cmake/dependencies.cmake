@@ -17,6 +17,7 @@ find_package(PkgConfig REQUIRED)
 pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
 pkg_check_modules(LZ4 REQUIRED IMPORTED_TARGET liblz4)
 pkg_check_modules(ZIP REQUIRED IMPORTED_TARGET libzip)
+pkg_check_modules(BLOSC REQUIRED IMPORTED_TARGET blosc)
 
 # libvulkan-volk-dev ships the loader as one C file; it is compiled once here.
 find_file(VOLK_SOURCE volk.c PATHS /usr/include REQUIRED)

@@ -2,9 +2,9 @@
 #include "host/particles/formats/bgeo_reader.h"
 
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include "host/particles/particle_loader.h"
+#include "tests/support/gzipped.h"
 #include "tests/support/opened_file.h"
 #include "tests/support/shared_data.h"
 
@@ -40,18 +40,6 @@ std::string bgeo(std::int32_t points = 2, std::int32_t attributes = 3, std::int3
     bytes += rawNumbers<float>({0.5f, 0.25f, x}, true);
   }
   return bytes;
-}
-
-std::string gzipped(const std::string& bytes) {
-  z_stream stream{};
-  EXPECT_EQ(deflateInit2(&stream, 6, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY), Z_OK);
-  std::string in = bytes, out(compressBound(bytes.size()) + 64, '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(in.data()), stream.avail_in = static_cast<uInt>(in.size());
-  stream.next_out = reinterpret_cast<Bytef*>(out.data()), stream.avail_out = static_cast<uInt>(out.size());
-  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
-  out.resize(stream.total_out);
-  deflateEnd(&stream);
-  return out;
 }
 
 TEST(BgeoReader, ReadsPointsAndTheirAttributesPlainAndPacked) {

@@ -7,6 +7,7 @@
 #include "host/core/error.h"
 #include "host/particles/formats/bgeo_reader.h"
 #include "host/particles/formats/csv_reader.h"
+#include "host/particles/formats/houdini_reader.h"
 #include "host/particles/formats/input_file.h"
 #include "host/particles/formats/npy_reader.h"
 #include "host/particles/formats/npz_reader.h"
@@ -42,6 +43,7 @@ constexpr Format kFormats[] = {
     {"PLY", beginsAsPly, open<PlyReader>},
     {"legacy VTK", beginsAsVtk, open<VtkReader>},
     {"classic BGEO", beginsAsBgeo, open<BgeoReader>, true},
+    {"Houdini's GEO and BGEO", beginsAsHoudini, open<HoudiniReader>, true},
     {"CSV and other tables of numbers", beginsAsTable, open<CsvReader>},  // last: any text might be one
 };
 
