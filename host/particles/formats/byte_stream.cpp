@@ -1,5 +1,8 @@
 #include "host/particles/formats/byte_stream.h"
 
+#include <algorithm>
+#include <cstring>
+
 namespace mote {
 namespace {
 
@@ -20,6 +23,18 @@ void ByteStream::seek(std::uint64_t position) {
   at_ = position;
 }
 
+bool ByteStream::skipTo(char c) {
+  while (used_ < buffer_.size() || refill()) {
+    const std::byte* begin = buffer_.data() + used_;
+    const void* found = std::memchr(begin, c, buffer_.size() - used_);
+    const std::size_t step = found ? static_cast<std::size_t>(static_cast<const std::byte*>(found) - begin)
+                                   : buffer_.size() - used_;
+    used_ += step, at_ += step;
+    if (found) return true;
+  }
+  return false;
+}
+
 std::string ByteStream::word(std::size_t most) {
   while (isSpace(peek())) next();
   std::string word;
@@ -36,8 +51,9 @@ std::string ByteStream::line(std::size_t most) {
 }
 
 bool ByteStream::refill() {
-  buffer_.resize(kBufferBytes);
-  buffer_.resize(file_.read(buffer_.data(), kBufferBytes));
+  // Not more than the file has: to clear the rest takes longer than to read a short one.
+  buffer_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kBufferBytes, file_.bytes() + 1)));
+  buffer_.resize(file_.read(buffer_.data(), buffer_.size()));
   used_ = 0;
   return !buffer_.empty();
 }

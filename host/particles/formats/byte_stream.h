@@ -22,6 +22,8 @@ class ByteStream {
     return static_cast<int>(buffer_[used_++]);
   }
   int peek() { return used_ == buffer_.size() && !refill() ? -1 : static_cast<int>(buffer_[used_]); }
+  /// On to the next byte of that value; false: there is none, and this is the end.
+  bool skipTo(char c);
   /// To a place in the file.
   void seek(std::uint64_t position);
   /// The next word, at most `most` characters of it; empty at the end.

@@ -15,6 +15,7 @@
 #include "host/particles/formats/prt2_reader.h"
 #include "host/particles/formats/prt_reader.h"
 #include "host/particles/formats/vtk_reader.h"
+#include "host/particles/formats/vtk_xml_reader.h"
 
 namespace mote {
 namespace {
@@ -42,6 +43,7 @@ constexpr Format kFormats[] = {
     {"NPZ", beginsAsNpz, open<NpzReader>},
     {"PLY", beginsAsPly, open<PlyReader>},
     {"legacy VTK", beginsAsVtk, open<VtkReader>},
+    {"VTK XML (VTU, VTP)", beginsAsVtkXml, open<VtkXmlReader>},
     {"classic BGEO", beginsAsBgeo, open<BgeoReader>, true},
     {"Houdini's GEO and BGEO", beginsAsHoudini, open<HoudiniReader>, true},
     {"CSV and other tables of numbers", beginsAsTable, open<CsvReader>},  // last: any text might be one
