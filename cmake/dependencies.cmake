@@ -19,6 +19,9 @@ pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
 pkg_check_modules(LZ4 REQUIRED IMPORTED_TARGET liblz4)
 pkg_check_modules(ZIP REQUIRED IMPORTED_TARGET libzip)
 pkg_check_modules(BLOSC REQUIRED IMPORTED_TARGET blosc)
+if(MOTE_HDF5)
+  pkg_check_modules(HDF5 REQUIRED IMPORTED_TARGET hdf5-serial)
+endif()
 
 # libvulkan-volk-dev ships the loader as one C file; it is compiled once here.
 find_file(VOLK_SOURCE volk.c PATHS /usr/include REQUIRED)

@@ -13,7 +13,7 @@ struct OurChannel {
 };
 constexpr OurChannel kChannels[] = {
     {"Position", {"P", "position", "pos", "Coordinates", "coordinates", "points"}},
-    {"Radius", {"pscale", "radius", "radiusPP"}},
+    {"Radius", {"pscale", "radius", "radiusPP", "SmoothingLength", "SmoothingLengths"}},
     {"Density", {"density", "Mass", "mass", "Masses", "opacityPP"}},
     {"Color", {"Cd", "color", "Colour", "colour", "rgbPP"}},
     {"Absorption", {"absorption"}},

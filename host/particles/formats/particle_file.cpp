@@ -8,6 +8,7 @@
 #include "host/particles/formats/bgeo_reader.h"
 #include "host/particles/formats/csv_reader.h"
 #include "host/particles/formats/houdini_reader.h"
+#include "host/particles/formats/hdf5_reader.h"
 #include "host/particles/formats/input_file.h"
 #include "host/particles/formats/npy_reader.h"
 #include "host/particles/formats/npz_reader.h"
@@ -46,6 +47,7 @@ constexpr Format kFormats[] = {
     {"VTK XML (VTU, VTP)", beginsAsVtkXml, open<VtkXmlReader>},
     {"classic BGEO", beginsAsBgeo, open<BgeoReader>, true},
     {"Houdini's GEO and BGEO", beginsAsHoudini, open<HoudiniReader>, true},
+    {"HDF5 (GADGET-4, AREPO, SWIFT)", beginsAsHdf5, open<Hdf5Reader>},
     {"CSV and other tables of numbers", beginsAsTable, open<CsvReader>},  // last: any text might be one
 };
 
