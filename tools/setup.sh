@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that Mote is built from and tested with, as far as they are missing.
-# tools/setup.sh --peers   also what mote_peers (-DMOTE_PEERS=ON) is built from.
+# tools/setup.sh --peers     also what mote_peers (-DMOTE_PEERS=ON) is built from.
+# tools/setup.sh --interop   also the programs that ctest's label `interop` reads and writes files with (VTK: 1 GB).
 # Needs root or sudo, and only where something is missing; no terminal. MOTE_NO_SETUP=1 leaves the machine as it is.
 set -euo pipefail
 
@@ -13,11 +14,16 @@ packages=(
   libassimp-dev libembree-dev libcli11-dev nlohmann-json3-dev libfmt-dev libhwy-dev libgtest-dev
   imagemagick fonts-dejavu-core python3 python3-numpy
 )
-if [[ $# -gt 1 || ( $# -eq 1 && "$1" != --peers ) ]]; then
-  printf 'usage: tools/setup.sh [--peers]   (got "%s")\n' "$*" >&2
-  exit 2
-fi
-if [[ $# -eq 1 ]]; then packages+=(libopenvdb-dev libboost-dev); fi
+for group in "$@"; do
+  case "$group" in
+    --peers) packages+=(libopenvdb-dev libboost-dev) ;;
+    --interop) packages+=(python3-numpy python3-h5py hdf5-tools python3-vtk9) ;;
+    *)
+      printf 'usage: tools/setup.sh [--peers] [--interop]   (got "%s")\n' "$*" >&2
+      exit 2
+      ;;
+  esac
+done
 
 # One line a package that dpkg knows, "g++ ii "; those it does not know are missing as well.
 missing_packages() {
