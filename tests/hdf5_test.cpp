@@ -38,13 +38,21 @@ TEST(Hdf5Reader, SaysThatThisBuildLacksIt) {
 template <class T>
 hid_t typeOf();
 template <>
-hid_t typeOf<float>() { return H5T_IEEE_F32LE; }
+hid_t typeOf<float>() {
+  return H5T_IEEE_F32LE;
+}
 template <>
-hid_t typeOf<double>() { return H5T_IEEE_F64LE; }
+hid_t typeOf<double>() {
+  return H5T_IEEE_F64LE;
+}
 template <>
-hid_t typeOf<std::uint64_t>() { return H5T_STD_U64LE; }
+hid_t typeOf<std::uint64_t>() {
+  return H5T_STD_U64LE;
+}
 template <>
-hid_t typeOf<std::int32_t>() { return H5T_STD_I32LE; }
+hid_t typeOf<std::int32_t>() {
+  return H5T_STD_I32LE;
+}
 
 /// How an array lies in the file.
 struct Storage {
@@ -69,7 +77,9 @@ class Maker {
   Maker& operator=(const Maker&) = delete;
 
   hid_t file() const { return file_; }
-  void group(const std::string& name) const { H5Gclose(H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT)); }
+  void group(const std::string& name) const {
+    H5Gclose(H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+  }
 
   template <class T>
   void attribute(const std::string& group, const std::string& name, const std::vector<T>& values) const {
@@ -80,14 +90,16 @@ class Maker {
     H5Aclose(own), H5Sclose(space), H5Gclose(at);
   }
   void text(const std::string& group, const std::string& name, const std::string& value) const {
-    const hid_t at = H5Gopen2(file_, group.c_str(), H5P_DEFAULT), space = H5Screate(H5S_SCALAR), type = H5Tcopy(H5T_C_S1);
+    const hid_t at = H5Gopen2(file_, group.c_str(), H5P_DEFAULT), space = H5Screate(H5S_SCALAR),
+                type = H5Tcopy(H5T_C_S1);
     H5Tset_size(type, value.size() + 1);
     const hid_t own = H5Acreate2(at, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT);
     EXPECT_GE(H5Awrite(own, type, value.c_str()), 0);
     H5Aclose(own), H5Tclose(type), H5Sclose(space), H5Gclose(at);
   }
   template <class T>
-  void array(const std::string& name, std::vector<hsize_t> shape, const std::vector<T>& values, Storage storage = {}) const {
+  void array(const std::string& name, std::vector<hsize_t> shape, const std::vector<T>& values,
+             Storage storage = {}) const {
     std::vector<hsize_t> most = shape;
     if (!storage.chunk.empty()) most[0] = H5S_UNLIMITED;  // a chunk may then be longer than the array
     const hid_t space = H5Screate_simple(static_cast<int>(shape.size()), shape.data(), most.data());
@@ -144,7 +156,8 @@ std::string nameOf(const OpenedFile& opened, const std::string& ours) {
 }
 
 TEST(Hdf5Reader, ReadsGasOfGadgetHoweverItIsStored) {
-  const Storage vectors[] = {{}, {{2, 3}, true, true, 6}, {{1, 2}, true, false, 9}, {{64, 3}, false, true}, {{1, 1}, false, false, 1}};
+  const Storage vectors[] = {
+      {}, {{2, 3}, true, true, 6}, {{1, 2}, true, false, 9}, {{64, 3}, false, true}, {{1, 1}, false, false, 1}};
   for (const Storage& own : vectors)
     for (const bool newest : {false, true}) {
       Storage numbers = own;
@@ -203,6 +216,30 @@ TEST(Hdf5Reader, WidensTheSmoothingLengthsOfSwiftToTheirSupport) {
   EXPECT_EQ(nameOf(opened, "Density"), "Masses");
   EXPECT_NE(opened.file->meta("", "Unit length in cgs (U_L)"), nullptr);
   EXPECT_EQ(opened.file->meta("", "Code")->bytes, "SWIFT");
+}
+
+TEST(Hdf5Reader, TakesSwiftsDefaultKernelWhereTheFileNamesNone) {
+  std::vector<std::string> warnings;
+  const WarningsKept kept(warnings);
+  const OpenedFile opened(made([](const Maker& maker) {
+    maker.group("Header"), maker.group("PartType0");
+    maker.text("Header", "Code", "SWIFT");
+    maker.array<double>("PartType0/Coordinates", {2, 3}, kTwo);
+    maker.array<double>("PartType0/SmoothingLengths", {2}, {1, 2});
+  }));
+  EXPECT_EQ(opened.read<double>("Radius"), (std::vector<double>{1.825742, 2 * 1.825742}));
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("Kernel gamma"), std::string::npos) << warnings[0];
+}
+
+TEST(Hdf5Reader, RefusesAKernelThatIsShorterThanItsSmoothingLength) {
+  expectFileRefused(made([](const Maker& maker) {
+                      for (const char* group : {"HydroScheme", "PartType0"}) maker.group(group);
+                      maker.attribute<double>("HydroScheme", "Kernel gamma", {0.5});
+                      maker.array<double>("PartType0/Coordinates", {2, 3}, kTwo);
+                      maker.array<double>("PartType0/SmoothingLengths", {2}, {1, 2});
+                    }),
+                    {"Kernel gamma", "got 0.5"});
 }
 
 TEST(Hdf5Reader, TakesTheRadiusFromTheVolumeWhereThereIsNoSmoothingLength) {
@@ -306,7 +343,9 @@ TEST(Hdf5Reader, ReadsManyRowsInPieces) {
   std::vector<double> values(3 * kRows);
   for (std::size_t k = 0; k < values.size(); ++k) values[k] = static_cast<double>(k);
   for (const Storage& storage : {Storage{}, Storage{{1000, 3}, true, false, 1}, Storage{{300000, 3}, true, true, 1}}) {
-    const OpenedFile opened(made([&](const Maker& maker) { maker.array<double>("Coordinates", {kRows, 3}, values, storage); }));
+    const OpenedFile opened(made([&](const Maker& maker) {
+      maker.array<double>("Coordinates", {kRows, 3}, values, storage);
+    }));
     const std::vector<std::byte> raw = opened.read<std::byte>("Coordinates");
     ASSERT_EQ(raw.size(), values.size() * sizeof(double));
     EXPECT_EQ(std::memcmp(raw.data(), values.data(), raw.size()), 0);
@@ -398,8 +437,9 @@ const std::string kLinked = made([](const Maker& maker) {
 
 TEST(Hdf5Reader, FollowsNoLinkIntoOtherFiles) {
   const TempFolder folder;
-  writeBytes(folder.file("other.hdf5"),
-             made([](const Maker& maker) { maker.array<float>("Coordinates", {2, 3}, {1, 2, 3, 4, 5, 6}); }));
+  writeBytes(folder.file("other.hdf5"), made([](const Maker& maker) {
+               maker.array<float>("Coordinates", {2, 3}, {1, 2, 3, 4, 5, 6});
+             }));
   writeBytes(folder.file("linked.hdf5"), kLinked);
   EXPECT_EQ(openParticleFile(folder.file("other.hdf5"))->count(), 2u);
   EXPECT_THROW(openParticleFile(folder.file("linked.hdf5")), InputError);
@@ -408,24 +448,26 @@ TEST(Hdf5Reader, FollowsNoLinkIntoOtherFiles) {
                       const hsize_t shape[2] = {2, 3};
                       const hid_t space = H5Screate_simple(2, shape, nullptr), plist = H5Pcreate(H5P_DATASET_CREATE);
                       H5Pset_external(plist, folder.file("raw").c_str(), 0, 24);
-                      const hid_t own = H5Dcreate2(maker.file(), "Coordinates", H5T_IEEE_F32LE, space, H5P_DEFAULT, plist,
-                                                   H5P_DEFAULT);
+                      const hid_t own = H5Dcreate2(maker.file(), "Coordinates", H5T_IEEE_F32LE, space, H5P_DEFAULT,
+                                                   plist, H5P_DEFAULT);
                       H5Dclose(own), H5Pclose(plist), H5Sclose(space);
                     }),
                     {"numbers that the file holds"});
 }
 
 TEST(Hdf5Reader, SaysWhichFilesHaveTheNumbersOfAVirtualOne) {
-  expectFileRefused(made([&](const Maker& maker) {
-                      const hsize_t shape[2] = {2, 3};
-                      const hid_t space = H5Screate_simple(2, shape, nullptr), plist = H5Pcreate(H5P_DATASET_CREATE);
-                      H5Pset_virtual(plist, space, "snap_0000.0.hdf5", "/PartType0/Coordinates", space);
-                      maker.group("PartType0");
-                      const hid_t own = H5Dcreate2(maker.file(), "PartType0/Coordinates", H5T_IEEE_F32LE, space,
-                                                   H5P_DEFAULT, plist, H5P_DEFAULT);
-                      H5Dclose(own), H5Pclose(plist), H5Sclose(space);
-                    },
-                    true),
+  expectFileRefused(made(
+                        [&](const Maker& maker) {
+                          const hsize_t shape[2] = {2, 3};
+                          const hid_t space = H5Screate_simple(2, shape, nullptr),
+                                      plist = H5Pcreate(H5P_DATASET_CREATE);
+                          H5Pset_virtual(plist, space, "snap_0000.0.hdf5", "/PartType0/Coordinates", space);
+                          maker.group("PartType0");
+                          const hid_t own = H5Dcreate2(maker.file(), "PartType0/Coordinates", H5T_IEEE_F32LE, space,
+                                                       H5P_DEFAULT, plist, H5P_DEFAULT);
+                          H5Dclose(own), H5Pclose(plist), H5Sclose(space);
+                        },
+                        true),
                     {"snap_0000.0.hdf5", "give that file"});
 }
 

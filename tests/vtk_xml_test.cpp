@@ -48,8 +48,8 @@ std::string head(const Mode& mode, std::initializer_list<std::uint64_t> sizes) {
 std::string packed(const Mode& mode, const std::string& block) {
   std::string out(compressBound(block.size()) + 64, '\0');
   if (mode.compressor == "vtkLZ4DataCompressor") {
-    out.resize(static_cast<std::size_t>(LZ4_compress_default(block.data(), out.data(), static_cast<int>(block.size()),
-                                                             static_cast<int>(out.size()))));
+    out.resize(static_cast<std::size_t>(
+        LZ4_compress_default(block.data(), out.data(), static_cast<int>(block.size()), static_cast<int>(out.size()))));
   } else {
     uLongf size = out.size();
     compress(reinterpret_cast<Bytef*>(out.data()), &size, reinterpret_cast<const Bytef*>(block.data()), block.size());
@@ -130,7 +130,8 @@ std::string three(const Mode& mode, const std::string& type = "UnstructuredGrid"
   text += writer.array<std::uint8_t>("type=\"UInt8\" Name=\"tint\" NumberOfComponents=\"3\"", {255, 0, 51, 0, 255, 0});
   text += "</PointData>\n<Points>" + writer.array<double>(kPoints, {1, 2, 3, 4, 5, 6.1}) + "</Points></Piece>\n";
   text += "<Piece NumberOfPoints=\"0\" NumberOfCells=\"0\"></Piece>";
-  text += "<Piece NumberOfPoints=\"1\"><Points>" + writer.array<double>(kPoints, {7, 8, -1e300}) + "</Points><PointData>";
+  text +=
+      "<Piece NumberOfPoints=\"1\"><Points>" + writer.array<double>(kPoints, {7, 8, -1e300}) + "</Points><PointData>";
   text += writer.array<std::uint64_t>("type=\"UInt64\" Name=\"id\"", {1ull << 63});
   text += writer.array<std::uint8_t>("type=\"UInt8\" Name=\"tint\" NumberOfComponents=\"3\"", {0, 0, 0});
   text += writer.array<float>("type=\"Float32\" Name=\"a &gt; b\"", {INFINITY}) + "</PointData></Piece>\n";
@@ -155,7 +156,8 @@ std::string two(const Mode& mode) {
   Writer writer(mode);
   std::string text = "<Piece NumberOfPoints=\"2\"><Points>";
   text += writer.array<double>(kPoints, {1, 2, 3, 4, 5, 6}) + "</Points><PointData>";
-  return writer.file(text + writer.array<float>("type=\"Float32\" Name=\"m\"", {1, 2}) + "</PointData></Piece>", "PolyData");
+  return writer.file(text + writer.array<float>("type=\"Float32\" Name=\"m\"", {1, 2}) + "</PointData></Piece>",
+                     "PolyData");
 }
 
 /// Every way to write a file.
@@ -187,8 +189,9 @@ TEST(VtkXmlReader, ReadsEveryWayToWriteNumbers) {
 TEST(VtkXmlReader, TakesHeadAndNumbersThatAreCodedEachForItself) {
   // Some writers pad the length's base64 before that of the numbers.
   const std::string numbers = rawNumbers<float>({1, 2, 3});
-  const std::string file = "<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPoints=\"1\"><Points><DataArray "
-                           "type=\"Float32\" NumberOfComponents=\"3\" format=\"binary\">";
+  const std::string file =
+      "<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPoints=\"1\"><Points><DataArray "
+      "type=\"Float32\" NumberOfComponents=\"3\" format=\"binary\">";
   const std::string end = "</DataArray></Points></Piece></PolyData></VTKFile>";
   for (const char* blank : {"", "\n  "})
     EXPECT_EQ(OpenedFile(file + blank + base64(head({}, {12})) + blank + base64(numbers) + blank + end)
@@ -208,11 +211,12 @@ TEST(VtkXmlReader, ReadsLongArraysInPieces) {
   const std::string block = packed(zlib, raw);
   const std::string binary = base64(head(zlib, {1, raw.size(), 0, block.size()})) + base64(block);
   for (const bool ascii : {true, false}) {
-    const OpenedFile opened("<VTKFile type=\"PolyData\" compressor=\"vtkZLibDataCompressor\"><PolyData><Piece "
-                            "NumberOfPoints=\"100000\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" "
-                            "format=\"" +
-                            std::string(ascii ? "ascii" : "binary") + "\">" + (ascii ? text : binary) +
-                            "</DataArray></Points></Piece></PolyData></VTKFile>");
+    const OpenedFile opened(
+        "<VTKFile type=\"PolyData\" compressor=\"vtkZLibDataCompressor\"><PolyData><Piece "
+        "NumberOfPoints=\"100000\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" "
+        "format=\"" +
+        std::string(ascii ? "ascii" : "binary") + "\">" + (ascii ? text : binary) +
+        "</DataArray></Points></Piece></PolyData></VTKFile>");
     const std::vector<vec3> positions = opened.read<vec3>("Position");
     ASSERT_EQ(positions.size(), 100000u);
     for (std::size_t i = 0; i < positions.size(); ++i)
@@ -238,8 +242,7 @@ TEST(VtkXmlReader, ReadsFilesOfSimulationsThroughTheLoader) {
 TEST(VtkXmlReader, LeavesOutWhatNotEveryPieceHas) {
   Writer writer;
   const std::string points = "<Points>" + writer.array<double>(kPoints, {1, 2, 3}) + "</Points>";
-  const std::string data =
-      "<PointData>" + writer.array<float>("type=\"Float32\" Name=\"mass\"", {1}) + "</PointData>";
+  const std::string data = "<PointData>" + writer.array<float>("type=\"Float32\" Name=\"mass\"", {1}) + "</PointData>";
   std::vector<std::string> warnings;
   const WarningsKept kept(warnings);
   const OpenedFile opened(writer.file("<Piece NumberOfPoints=\"1\">" + points + data +
@@ -258,8 +261,9 @@ std::string one(double x) {
 }
 
 std::string parallel(const std::vector<std::string>& sources) {
-  std::string text = "<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid GhostLevel=\"0\"><PPoints><PDataArray "
-                     "type=\"Float64\" NumberOfComponents=\"3\"/></PPoints>";
+  std::string text =
+      "<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid GhostLevel=\"0\"><PPoints><PDataArray "
+      "type=\"Float64\" NumberOfComponents=\"3\"/></PPoints>";
   for (const std::string& source : sources) text += "<Piece Source=\"" + source + "\"/>";
   return text + "</PUnstructuredGrid></VTKFile>";
 }
@@ -329,16 +333,18 @@ std::string piece(const std::string& points, const std::string& array) {
 TEST(VtkXmlReader, RefusesHostileSizesWithoutAllocating) {
   const std::string begin = "<DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"";
   const std::string text = begin + "ascii\">1 2 3</DataArray>";
-  for (const char* points : {"2", "18446744073709551615", "6148914691236517206", "99999999999999999999", "-1", "1e3", ""})
+  for (const char* points :
+       {"2", "18446744073709551615", "6148914691236517206", "99999999999999999999", "-1", "1e3", ""})
     expectFileRefused(piece(points, text), {"particles", "Piece 0"});
   for (const std::uint64_t length : {std::uint64_t{11}, std::uint64_t{13}, std::uint64_t{0xffffffff}})
-    expectFileRefused(piece("1", begin + "binary\">" + base64(head({}, {length}) + rawNumbers<float>({1, 2, 3})) +
-                                     "</DataArray>"),
-                      {"12 bytes", std::to_string(length)});
+    expectFileRefused(
+        piece("1", begin + "binary\">" + base64(head({}, {length}) + rawNumbers<float>({1, 2, 3})) + "</DataArray>"),
+        {"12 bytes", std::to_string(length)});
   expectFileRefused(piece("300000000", begin + "binary\">" + base64(head({}, {3600000000}) + "abc") + "</DataArray>"),
                     {"cut off"});
 
-  const auto zlib = [&](const std::string& points, std::initializer_list<std::uint64_t> sizes, const std::string& data) {
+  const auto zlib = [&](const std::string& points, std::initializer_list<std::uint64_t> sizes,
+                        const std::string& data) {
     std::string file = piece(points, begin + "binary\">" + base64(head({}, sizes)) + base64(data) + "</DataArray>");
     return file.replace(0, 8, "<VTKFile compressor=\"vtkZLibDataCompressor\"");
   };
@@ -363,11 +369,11 @@ TEST(VtkXmlReader, RefusesPiecesThatShareTheirNumbers) {
   // 1000 pieces of the same 12000 bytes would be 1000 times the particles that the file has.
   std::string pieces;
   for (int k = 0; k < 1000; ++k)
-    pieces += "<Piece NumberOfPoints=\"1000\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" "
-              "format=\"appended\" offset=\"0\"/></Points></Piece>";
-  expectFileRefused("<VTKFile type=\"PolyData\"><PolyData>" + pieces +
-                        "</PolyData><AppendedData encoding=\"raw\">_" + head({}, {12000}) + std::string(12000, '\0') +
-                        "</AppendedData></VTKFile>",
+    pieces +=
+        "<Piece NumberOfPoints=\"1000\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" "
+        "format=\"appended\" offset=\"0\"/></Points></Piece>";
+  expectFileRefused("<VTKFile type=\"PolyData\"><PolyData>" + pieces + "</PolyData><AppendedData encoding=\"raw\">_" +
+                        head({}, {12000}) + std::string(12000, '\0') + "</AppendedData></VTKFile>",
                     {"numbers of its own", "those of others again"});
 }
 
@@ -384,9 +390,10 @@ TEST(VtkXmlReader, SaysWhatItDoesNotRead) {
   expectFileRefused("<VTKFile type=\"ImageData\"><ImageData/></VTKFile>",
                     {"UnstructuredGrid or PolyData", "'ImageData'", "Convert To Point Cloud"});
   expectFileRefused("<VTKFile type=\"PStructuredGrid\"></VTKFile>", {"'PStructuredGrid'"});
-  expectFileRefused("<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"0\" file=\"a_0.vtu\"/></Collection>"
-                    "</VTKFile>",
-                    {"'Collection'", "give one of them, 'a_0.vtu'"});
+  expectFileRefused(
+      "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"0\" file=\"a_0.vtu\"/></Collection>"
+      "</VTKFile>",
+      {"'Collection'", "give one of them, 'a_0.vtu'"});
   expectFileRefused("<VTKFile type=\"PolyData\" compressor=\"vtkLZMADataCompressor\"></VTKFile>",
                     {"vtkZLibDataCompressor or vtkLZ4DataCompressor", "'vtkLZMADataCompressor'", "ParaView"});
   expectFileRefused("<VTKFile type=\"PolyData\" byte_order=\"Middle\"></VTKFile>", {"LittleEndian", "'Middle'"});
@@ -403,8 +410,9 @@ TEST(VtkXmlReader, SaysWhatItDoesNotRead) {
                     {"'Position'", "'two' as number 1"});
   expectFileRefused(piece("1", "<DataArray type=\"Float32\" NumberOfComponents=\"3\">1 2.5   </DataArray>"),
                     {"3 numbers", "got 2"});
-  expectFileRefused(piece("1", "<DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>"),
-                    {"AppendedData", "none in the file"});
+  expectFileRefused(
+      piece("1", "<DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>"),
+      {"AppendedData", "none in the file"});
   expectFileRefused(piece("1", "<DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"hex\">1 2 3</DataArray>"),
                     {"ascii, binary or appended", "'hex'"});
 }

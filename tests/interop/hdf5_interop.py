@@ -38,7 +38,8 @@ def filled(path, storage, random, **options):
                     if kind[-2] != "f":
                         own["scaleoffset"] = 0
                 gas.create_dataset(f"{kind[-2:]}{'big' if kind[0] == '>' else ''}x{arity}", data=values, **own)
-        gas.create_dataset("Coordinates", data=random.random((COUNT, 3)), **{k: v for k, v in storage.items() if k != "scaleoffset"})
+        whole = {key: value for key, value in storage.items() if key != "scaleoffset"}
+        gas.create_dataset("Coordinates", data=random.random((COUNT, 3)), **whole)
         return [name for name in gas]
 
 
@@ -47,7 +48,8 @@ def dumped(h5dump, path, name, like):
     with tempfile.NamedTemporaryFile() as out:
         subprocess.run([h5dump, "-d", "/PartType0/" + name, "-b", "LE", "-o", out.name, str(path)], check=True,
                        stdout=subprocess.DEVNULL)
-        return numpy.frombuffer(pathlib.Path(out.name).read_bytes(), dtype=like.dtype.newbyteorder("<")).reshape(like.shape)
+        raw = pathlib.Path(out.name).read_bytes()
+        return numpy.frombuffer(raw, dtype=like.dtype.newbyteorder("<")).reshape(like.shape)
 
 
 def main():
@@ -68,7 +70,8 @@ def main():
                     for name in names:
                         what = f"{storage} {libver} {name}"
                         mote_reads.require_same(what + " (h5py)", ours[name], file["PartType0"][name][()])
-                        mote_reads.require_same(what + " (h5dump)", ours[name], dumped(sys.argv[2], path, name, ours[name]))
+                        theirs = dumped(sys.argv[2], path, name, ours[name])
+                        mote_reads.require_same(what + " (h5dump)", ours[name], theirs)
                 done += 1
         with h5py.File(path, "w") as file:  # h5py's own filter, which libhdf5 lacks
             file.create_dataset("Coordinates", data=random.random((COUNT, 3)), compression="lzf")

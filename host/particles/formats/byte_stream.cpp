@@ -27,8 +27,8 @@ bool ByteStream::skipTo(char c) {
   while (used_ < buffer_.size() || refill()) {
     const std::byte* begin = buffer_.data() + used_;
     const void* found = std::memchr(begin, c, buffer_.size() - used_);
-    const std::size_t step = found ? static_cast<std::size_t>(static_cast<const std::byte*>(found) - begin)
-                                   : buffer_.size() - used_;
+    const std::size_t step =
+        found ? static_cast<std::size_t>(static_cast<const std::byte*>(found) - begin) : buffer_.size() - used_;
     used_ += step, at_ += step;
     if (found) return true;
   }

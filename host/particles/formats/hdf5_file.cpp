@@ -232,8 +232,7 @@ struct Hdf5File::Impl {
     const Handle access(H5Pcreate(H5P_FILE_ACCESS));
     H5Pset_file_locking(access, false, true);  // read-only shares may not lock
     const hid_t id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, access);
-    if (id < 0)
-      throw InputError(path, "HDF5", "a file that libhdf5 opens", reason(), "the file is cut off or damaged");
+    if (id < 0) throw InputError(path, "HDF5", "a file that libhdf5 opens", reason(), "the file is cut off or damaged");
     return id;
   }
   explicit Impl(const std::string& name) : path(name), bytes(InputFile(name).bytes()), file(open(name)) {}
@@ -303,7 +302,8 @@ class RowsBase : public Hdf5Rows {
     const std::size_t row = std::max(fileSize_, numberSize(array_.type)) * array_.arity;
     perBlock_ = std::max<std::uint64_t>(1, kBlockBytes / row);
     // Whole chunks, or each would be unpacked again and again.
-    if (layout_.kind == H5D_CHUNKED) perBlock_ = (perBlock_ + layout_.chunk[0] - 1) / layout_.chunk[0] * layout_.chunk[0];
+    if (layout_.kind == H5D_CHUNKED)
+      perBlock_ = (perBlock_ + layout_.chunk[0] - 1) / layout_.chunk[0] * layout_.chunk[0];
   }
 
   std::size_t next(std::vector<std::byte>& rows) override {
@@ -362,8 +362,8 @@ class DeflatedRows : public RowsBase {
         const std::size_t columns = std::min<std::size_t>(layout_.chunk[1], arity - column) * fileSize_;
         const std::size_t end = std::min<std::size_t>(count, row + layout_.chunk[0]);
         for (std::size_t r = row; r < end; ++r)
-          std::memcpy(&rows[(r * arity + column) * fileSize_],
-                      &plain_[(r - row) * layout_.chunk[1] * fileSize_], columns);
+          std::memcpy(&rows[(r * arity + column) * fileSize_], &plain_[(r - row) * layout_.chunk[1] * fileSize_],
+                      columns);
       }
     if (H5Tconvert(fileType_, memoryType(array_.type), count * arity, rows.data(), nullptr, H5P_DEFAULT) < 0)
       fail(reason());

@@ -27,6 +27,8 @@ constexpr std::string_view kTypes = "PartType";
 /// Names that programs give positions; of these the root of a plain file has one.
 constexpr std::string_view kPositions[] = {"Coordinates", "coordinates", "Position", "position", "Positions",
                                            "positions",   "pos",         "P",        "points"};
+/// Support radius ÷ smoothing length of SWIFT's default kernel in three dimensions (Dehnen & Aly 2012, table 1).
+constexpr double kCubicSplineGamma = 1.825742;
 constexpr std::string_view kSmoothing[] = {"SmoothingLengths", "SmoothingLength"};
 
 const Hdf5Array* find(const std::vector<Hdf5Array>& arrays, std::string_view name) {
@@ -49,6 +51,11 @@ std::string shapesOf(const std::vector<Hdf5Array>& arrays) {
   std::string text;
   for (std::size_t k = 0; k < std::min(arrays.size(), kMost); ++k) text += (k > 0 ? ", " : "") + shapeOf(arrays[k]);
   return arrays.empty() ? "none" : text + (arrays.size() > kMost ? " …" : "");
+}
+
+bool isOfSwift(const ParticleFile& file) {
+  const Metadata* code = file.meta("", "Code");
+  return code && code->bytes.starts_with("SWIFT");
 }
 
 bool isDigits(std::string_view text) {
@@ -116,18 +123,17 @@ std::vector<std::string> Hdf5Reader::partPaths() const {
     missing += (missing.empty() ? "" : ", ") + name;
   }
   if (!missing.empty())
-    throw InputError(path_, "HDF5, NumFilesPerSnapshot", fmt::format("{} files side by side", said),
-                     "no " + missing, "a snapshot is read whole: put its other files beside this one");
+    throw InputError(path_, "HDF5, NumFilesPerSnapshot", fmt::format("{} files side by side", said), "no " + missing,
+                     "a snapshot is read whole: put its other files beside this one");
   return paths;
 }
 
 void Hdf5Reader::openSnapshot(const Hdf5File& first) {
   for (std::string& path : partPaths()) parts_.push_back({std::move(path), {}});
   chooseGroup();
-  for (Part& part : parts_) part.arrays = part.path == path_ ? first.arrays(group_) : Hdf5File(part.path).arrays(group_);
-  const Metadata* code = meta("", "Code");
-  const bool swift = code && code->bytes.starts_with("SWIFT");
-  format_ = fmt::format("HDF5{}, {}{}", swift ? " of SWIFT" : "", group_,
+  for (Part& part : parts_)
+    part.arrays = part.path == path_ ? first.arrays(group_) : Hdf5File(part.path).arrays(group_);
+  format_ = fmt::format("HDF5{}, {}{}", isOfSwift(*this) ? " of SWIFT" : "", group_,
                         parts_.size() > 1 ? fmt::format(" in {} files", parts_.size()) : "");
   addArrays("Coordinates");
   addMasses();
@@ -199,7 +205,8 @@ void Hdf5Reader::addArrays(const std::string& counted) {
     if (why.empty()) {
       const bool gasDensity = array.name == "Density" && group_ == "PartType0" &&
                               (find(parts_[0].arrays, "Masses") || metaNumber("MassTable", 0) > 0);
-      addChannel({gasDensity ? "MassDensity" : array.name, array.type, array.arity}, {Source::Kind::Array, array.name, 0});
+      addChannel({gasDensity ? "MassDensity" : array.name, array.type, array.arity},
+                 {Source::Kind::Array, array.name, 0});
     } else if (array.name == counted) {
       throw InputError(path_, "HDF5, " + counted, "one type in all files", "it " + why);
     } else if (!group_.empty()) {
@@ -224,12 +231,17 @@ void Hdf5Reader::addRadius() {
   for (const std::string_view name : kSmoothing) {
     const Channel* smoothing = channel(name);
     if (!smoothing || smoothing->arity != 1) continue;
-    double gamma = 1;
+    double gamma = isOfSwift(*this) ? 0 : 1;
     for (const Metadata& entry : Hdf5File(path_).attributes("HydroScheme"))
       if (entry.name == "Kernel gamma") {
         metadata_.push_back(entry);
         gamma = metaNumber(entry.name, 0);
       }
+    if (gamma == 0) {
+      gamma = kCubicSplineGamma;
+      logWarning(fmt::format(
+          "{}: HydroScheme has no 'Kernel gamma': radii are {} smoothing lengths, as of a cubic spline", path_, gamma));
+    }
     if (!(gamma >= 1) || !std::isfinite(gamma))  // the support is never shorter
       throw InputError(path_, "HDF5, HydroScheme, Kernel gamma", "a number ≥ 1", fmt::format("{}", gamma));
     Channel radius{"Radius", smoothing->type, 1, gamma};

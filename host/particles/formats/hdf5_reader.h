@@ -24,9 +24,9 @@ bool beginsAsHdf5(std::span<const std::byte> start);
 
 class Hdf5Reader : public ParticleFile {
  public:
-  /// Throws InputError on what is no HDF5, is damaged, or holds no particles; where a snapshot's other files are missing
-  /// (naming them); and where it has no gas, but several other types of particles (naming them and their numbers). The
-  /// attributes of Header, Units and Cosmology, and the units of Parameters, are metadata.
+  /// Throws InputError on what is no HDF5, is damaged, or holds no particles; where a snapshot's other files are
+  /// missing (naming them); and where it has no gas, but several other types of particles (naming them and their
+  /// numbers). The attributes of Header, Units and Cosmology, and the units of Parameters, are metadata.
   explicit Hdf5Reader(std::string path);
 
   /// Cost: that of reading the arrays asked for; deflated ones some 200 MB/s.

@@ -9,8 +9,8 @@ namespace mote {
 
 /// Stays small however long the arrays are, so that an XML library may have it whole.
 struct VtkXmlMarkup {
-  /// Well-formed where the file is. Comments are left out, and every text that is not blank is "BEGIN END", the place of
-  /// its bytes in the file.
+  /// Well-formed where the file is. Comments are left out, and every text that is not blank is "BEGIN END", the place
+  /// of its bytes in the file.
   std::string xml;
   /// The first byte behind the '_' of AppendedData, whose content need not be text at all; 0: there is none. What
   /// follows is not in `xml`, which closes the tags by itself.

@@ -59,11 +59,14 @@ class Header {
       if (type == known || type == std::string("P") + known) return known;
     const pugi::xml_node listed = root_.find_node([](const pugi::xml_node& n) { return !n.attribute("file").empty(); });
     throw InputError(path_, "VTKFile, type", "UnstructuredGrid or PolyData, whose points are particles", shown(type),
-                     listed ? fmt::format("it lists files: give one of them, {}", shown(listed.attribute("file").value()))
-                            : "ParaView's filter 'Convert To Point Cloud' makes PolyData of a grid");
+                     listed
+                         ? fmt::format("it lists files: give one of them, {}", shown(listed.attribute("file").value()))
+                         : "ParaView's filter 'Convert To Point Cloud' makes PolyData of a grid");
   }
-  bool parallel() const { return std::string_view(root_.attribute("type").value()).starts_with("PU") ||
-                                 std::string_view(root_.attribute("type").value()).starts_with("PP"); }
+  bool parallel() const {
+    return std::string_view(root_.attribute("type").value()).starts_with("PU") ||
+           std::string_view(root_.attribute("type").value()).starts_with("PP");
+  }
 
  private:
   /// Which of the values it is; the first where the attribute is not there.
@@ -75,8 +78,9 @@ class Header {
     std::string all;
     for (const std::string_view known : values)
       if (!known.empty()) all += (all.empty() ? "" : " or ") + std::string(known);
-    throw InputError(path_, fmt::format("VTKFile, {}", name), all, shown(value),
-                     std::string_view(name) == "compressor" ? "ParaView can write it with another compressor, or none" : "");
+    throw InputError(
+        path_, fmt::format("VTKFile, {}", name), all, shown(value),
+        std::string_view(name) == "compressor" ? "ParaView can write it with another compressor, or none" : "");
   }
 
   const std::string& path_;
@@ -208,14 +212,14 @@ std::vector<Metadata> fieldData(const VtkXmlReader::Part& part, const pugi::xml_
     const std::uint64_t tuples = part.number(node, "NumberOfTuples", what), arity = part.arity(node, what);
     if (tuples == 0 || tuples > kMostFieldNumbers / arity) continue;
     if (std::any_of(found.begin(), found.end(), [&](const Metadata& m) { return m.name == name; })) continue;
-    const auto numbers =
-        openVtkXmlNumbers(part.file, part.coding, part.place(node, what), *type, tuples * arity, what);
+    const auto numbers = openVtkXmlNumbers(part.file, part.coding, part.place(node, what), *type, tuples * arity, what);
     const std::size_t size = numberSize(*type);
     std::string bytes(static_cast<std::size_t>(tuples * arity) * size, '\0');
     numbers->read(reinterpret_cast<std::byte*>(bytes.data()), static_cast<std::size_t>(tuples * arity));
     if (numbers->bigEndian())
       for (std::size_t k = 0; k < bytes.size(); k += size)
-        std::reverse(bytes.begin() + static_cast<std::ptrdiff_t>(k), bytes.begin() + static_cast<std::ptrdiff_t>(k + size));
+        std::reverse(bytes.begin() + static_cast<std::ptrdiff_t>(k),
+                     bytes.begin() + static_cast<std::ptrdiff_t>(k + size));
     found.push_back({"", name, static_cast<std::int32_t>(*type), std::move(bytes)});
   }
   return found;
@@ -255,7 +259,8 @@ VtkXmlReader::VtkXmlReader(std::string path) : ParticleFile(std::move(path)) {
       const Part& part = *parts_.back();
       const Header own(name, part.root);
       if (own.kind() != kind || own.parallel())
-        part.fail("VTKFile, type", fmt::format("{}, as {} says", kind, path_), shown(part.root.attribute("type").value()));
+        part.fail("VTKFile, type", fmt::format("{}, as {} says", kind, path_),
+                  shown(part.root.attribute("type").value()));
       take(part, part.root.child(kind.c_str()));
     }
   }

@@ -2,8 +2,8 @@
 // which name others beside them ("VTK XML Formats", Kitware). Numbers as text, as base64 in place, or appended, raw or
 // as base64; of both byte orders; not packed, or packed with zlib or LZ4.
 //
-// Points is Position, each array of numbers of PointData a channel; unsigned bytes of arity 3 or 4 are colours, 255 is 1,
-// as VTK itself shows them. Pieces are joined in their order. Cells and their data are stepped over. Short arrays of
+// Points is Position, each array of numbers of PointData a channel; unsigned bytes of arity 3 or 4 are colours, 255 is
+// 1, as VTK itself shows them. Pieces are joined in their order. Cells and their data are stepped over. Short arrays of
 // FieldData (TimeValue) are metadata.
 #pragma once
 #include <cstddef>
