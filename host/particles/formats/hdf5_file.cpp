@@ -242,7 +242,7 @@ struct Hdf5File::Impl {
     throw InputError(path, what, expected, got, hint);
   }
   Handle group(const std::string& name) const {
-    return Handle(H5Gopen2(file, name.empty() ? "/" : ("/" + name).c_str(), H5P_DEFAULT));
+    return Handle(H5Gopen2(file, name.empty() ? "/" : fmt::format("/{}", name).c_str(), H5P_DEFAULT));
   }
 };
 
@@ -504,7 +504,8 @@ std::vector<Metadata> Hdf5File::attributes(const std::string& group) const {
 std::unique_ptr<Hdf5Rows> Hdf5File::rows(const std::string& group, const Hdf5Array& array) const {
   const Session session;
   const std::string what = fmt::format("HDF5, {}/{}", group, array.name);
-  Handle dataset(H5Dopen2(impl_->file, ("/" + (group.empty() ? "" : group + "/") + array.name).c_str(), H5P_DEFAULT));
+  Handle dataset(
+      H5Dopen2(impl_->file, fmt::format("/{}{}{}", group, group.empty() ? "" : "/", array.name).c_str(), H5P_DEFAULT));
   if (!dataset.ok()) impl_->fail(what, "a dataset", reason());
   const auto now = arrayOf(dataset, array.name, impl_->bytes);
   if (!now || now->rows != array.rows || now->arity != array.arity || now->type != array.type || !now->stored)
