@@ -1,4 +1,4 @@
-"""Writes what numpy.save and numpy.savez make of one cloud of particles, for numpy_test.cpp. Usage: write_numpy.py FOLDER"""
+"""Writes what numpy.save and numpy.savez make of one cloud of particles: write_numpy.py FOLDER (for numpy_test.cpp)."""
 import os
 import sys
 

@@ -29,7 +29,7 @@ class NpzReader : public ParticleFile {
   /// for more than its member has.
   explicit NpzReader(std::string path);
 
-  /// Cost: that of reading the members asked for, or zlib's, about 0.3 GB/s of numbers. A packed array in Fortran's
+  /// Cost: that of reading the members asked for, or zlib's, about 0.2 GB/s of numbers. A packed array in Fortran's
   /// order is held in memory while it is read.
   void read(std::span<const ChannelRequest> requests) const override;
 
