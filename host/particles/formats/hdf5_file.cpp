@@ -131,9 +131,10 @@ hid_t memoryType(NumberType type) {
 }
 
 std::optional<NumberType> numberType(hid_t type) {
-  const std::size_t size = H5Tget_size(type);
+  const std::size_t size = H5Tget_size(type);  // 0 in damaged files
+  if (size < 1 || size > 8) return std::nullopt;
   switch (H5Tget_class(type)) {
-    case H5T_FLOAT: return size > 8 ? std::nullopt : std::optional(size > 4 ? NumberType::F64 : NumberType::F32);
+    case H5T_FLOAT: return size > 4 ? NumberType::F64 : NumberType::F32;
     case H5T_INTEGER: break;
     default: return std::nullopt;
   }
