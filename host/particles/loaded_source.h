@@ -1,0 +1,21 @@
+// The particles of one source on their way into the scene.
+#pragma once
+#include <string>
+
+#include "host/particles/particle_set.h"
+#include "host/scene/scene.h"
+
+namespace mote {
+
+struct LoadedSource {
+  ParticleSet set;
+  std::string place;  ///< what messages about them start with: the file's path, or where the source stands
+  bool hasColor = false;
+};
+
+/// Where a source stands in the scene, for messages.
+inline std::string scenePlace(const ParticleSource& source) {
+  return source.pointer.empty() ? "particles" : source.pointer;
+}
+
+}  // namespace mote
