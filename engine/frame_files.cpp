@@ -28,7 +28,7 @@ FrameFiles loadFrame(const Scene& scene, int number, FramePurpose purpose) {
   const Timer timer;
   files.number = number;
   std::vector<std::string> paths;
-  files.particles = loadParticles(scene.particles, number, scene.medium.densityMode, &paths);
+  files.particles = loadParticles(scene.particles, number, LoadRules(scene), &paths);
   for (const Solid& solid : scene.solids) {
     files.meshes.push_back(loadMesh(solid, number));
     paths.push_back(framePath(solid.file, number));

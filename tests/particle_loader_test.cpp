@@ -14,23 +14,14 @@
 #include "host/particles/generate.h"
 #include "host/particles/particle_loader.h"
 #include "host/particles/spacing.h"
+#include "tests/support/refusal.h"
 #include "tests/support/temp_folder.h"
 
 namespace mote {
 namespace {
 
+using test::expectRefused;
 using test::TempFolder;
-
-void expectRefused(const std::function<void()>& action, const std::vector<std::string>& words) {
-  try {
-    action();
-    ADD_FAILURE() << "nothing was thrown; expected a message with '" << words[0] << "'";
-  } catch (const InputError& error) {
-    for (const std::string& word : words)
-      EXPECT_NE(std::string(error.what()).find(word), std::string::npos)
-          << "'" << word << "' is not in: " << error.what();
-  }
-}
 
 ParticleSource fileSource(const std::string& path) {
   ParticleSource source;

@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "host/core/parallel.h"
+#include "host/particles/file_units.h"
 #include "host/particles/formats/number_visit.h"
 #include "host/particles/formats/particle_file.h"
 #include "host/particles/spacing.h"
@@ -192,6 +193,14 @@ std::string pointText(const Json& point) {
   return fmt::format("({}, {}, {})", valueText(point[0]), valueText(point[1]), valueText(point[2]));
 }
 
+/// What a number stands for, where it is a code.
+std::string meaningText(const Json& entry) {
+  if (entry["name"] != "CoordSys" || !entry["channel"].get<std::string>().empty()) return "";
+  if (!entry["value"].is_array() || entry["value"].empty() || !entry["value"][0].is_number_integer()) return "";
+  const std::string axes = axesText(entry["value"][0].get<int>());
+  return axes.empty() ? "" : fmt::format(" ({})", axes);
+}
+
 std::string metadataText(const Json& entry) {
   if (entry["value"].is_string()) return entry["value"].get<std::string>();
   std::string text;
@@ -243,7 +252,7 @@ void printParticles(const Json& info) {
     const auto channel = entry["channel"].get<std::string>();
     fmt::print("  {:<23} {}\n",
                fmt::format("{}{}{}", channel, channel.empty() ? "" : ".", entry["name"].get<std::string>()),
-               metadataText(entry));
+               metadataText(entry) + meaningText(entry));
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 #include <string>
 
+#include "host/particles/file_units.h"
 #include "host/particles/particle_set.h"
 #include "host/scene/scene.h"
 
@@ -11,6 +12,7 @@ struct LoadedSource {
   ParticleSet set;
   std::string place;  ///< what messages about them start with: the file's path, or where the source stands
   bool hasColor = false;
+  FileUnits units;
 };
 
 /// Where a source stands in the scene, for messages.

@@ -80,7 +80,7 @@ ParticleSet merged(const std::vector<ParticleSource>& sources, std::vector<Loade
 
 }  // namespace
 
-ParticleSet loadParticles(const std::vector<ParticleSource>& sources, int frame, DensityMode mode,
+ParticleSet loadParticles(const std::vector<ParticleSource>& sources, int frame, const LoadRules& rules,
                           std::vector<std::string>* openedFiles) {
   if (sources.empty()) throw InputError("particles", "", "at least one source", "none");
   std::vector<LoadedSource> parts;
@@ -88,10 +88,11 @@ ParticleSet loadParticles(const std::vector<ParticleSource>& sources, int frame,
   for (const ParticleSource& source : sources) {
     const std::string path = source.file.empty() ? "" : framePath(source.file, frame);
     if (openedFiles && !path.empty()) openedFiles->push_back(path);
-    LoadedSource loaded = path.empty() ? generateSource(source, frame) : readSource(source, path);
+    LoadedSource loaded =
+        path.empty() ? generateSource(source, frame) : readSource(source, path, rules.framesPerSecond);
     checkParticles(loaded, "");
     applyRadiusRule(source, loaded);
-    moveIntoScene(source, mode, loaded.set);
+    moveIntoScene(source, rules.densityMode, loaded);
     checkParticles(loaded, " in the scene");  // what was finite in the file may not be after scaling
     if (loaded.set.size() == 0) empty += fmt::format("{}{}", empty.empty() ? "" : ", ", loaded.place);
     parts.push_back(std::move(loaded));

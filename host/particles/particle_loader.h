@@ -8,13 +8,24 @@
 
 namespace mote {
 
+/// What of a scene decides about its particles, beside their sources.
+struct LoadRules {
+  DensityMode densityMode = DensityMode::CrossSection;
+  double framesPerSecond = 24;  ///< of velocities per frame
+
+  LoadRules() = default;
+  LoadRules(DensityMode mode) : densityMode(mode) {}  ///< implicit: a mode alone is all that most callers have
+  explicit LoadRules(const Scene& scene) : densityMode(scene.medium.densityMode), framesPerSecond(scene.frames.fps) {}
+};
+
 /// Loads every source for `frame` ('####' in a file name is the frame, see framePath) and merges them in order.
 ///
 /// Our channels and what they are called in a file unless `ParticleSource::channels` says otherwise: Position (needed),
 /// Radius, Density, Color, Absorption, Emission, Velocity, ID. Colours may be grey (arity 1). Without Density or Color
 /// the source's `density` and `color` hold. Radius by the source's rule, in the file's own units: Auto takes the
 /// channel Radius if there is one (a generator's own radii), else 1.5 × meanNeighbourDistance for all of the source.
-/// Then scale, rotate about x, y, z and translate, in double; radii, whatever their rule, and velocities scale along,
+/// Then the file's axes and unit where the source says so (file_units.h), scale, rotate about x, y, z and translate, in
+/// double; radii, whatever their rule, and velocities scale along,
 /// and cross-sections with the square (in mode Peak: densities stay); colour, absorption and emission stay.
 ///
 /// Where only some sources have Color, Velocity, Emission or ID, the rest get their `color`, zero, zero, and the index
@@ -27,8 +38,7 @@ namespace mote {
 /// position, radius, density, colour, absorption, emission or velocity is not finite, radius ≤ 0, density, absorption
 /// or emission < 0 (with its index and value), no spacing to take a radius from. Costs: that of PrtReader, and 0.02
 /// core-seconds for each million.
-ParticleSet loadParticles(const std::vector<ParticleSource>& sources, int frame,
-                          DensityMode mode = DensityMode::CrossSection,
+ParticleSet loadParticles(const std::vector<ParticleSource>& sources, int frame, const LoadRules& rules = {},
                           std::vector<std::string>* openedFiles = nullptr);
 
 }  // namespace mote

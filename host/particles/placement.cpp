@@ -36,16 +36,21 @@ void applyRadiusRule(const ParticleSource& source, LoadedSource& loaded) {
   set.radius.assign(set.size(), radius);
 }
 
-void moveIntoScene(const ParticleSource& source, DensityMode mode, ParticleSet& set) {
-  if (source.scale == 1 && source.rotate == vec3(0) && source.translate == vec3(0)) return;  // exact, not merely close
+void moveIntoScene(const ParticleSource& source, DensityMode mode, LoadedSource& loaded) {
+  ParticleSet& set = loaded.set;
+  const FileUnits& units = loaded.units;
+  if (units.velocity != 1)
+    for (vec3& v : set.velocity) v = vec3(dvec3(v) * units.velocity);
+  const bool stays = source.scale == 1 && source.rotate == vec3(0) && source.translate == vec3(0);
+  if (stays && units.none()) return;  // exact, not merely close
   dmat4 rotation(1);
   for (const int axis : {2, 1, 0}) {  // Rz · Ry · Rx: x is applied first
     dvec3 about(0);
     about[axis] = 1;
     rotation = glm::rotate(rotation, glm::radians(static_cast<double>(source.rotate[axis])), about);
   }
-  const double scale = source.scale;
-  const glm::dmat3 linear = glm::dmat3(rotation) * scale;
+  const double scale = source.scale * units.length;
+  const glm::dmat3 linear = (glm::dmat3(rotation) * scale) * units.axes;
   const dvec3 translate(source.translate);
   const double area = mode == DensityMode::Peak ? 1 : scale * scale;
   parallelBlocks(set.size(), kGrain, [&](std::size_t begin, std::size_t end) {

@@ -9,8 +9,9 @@ namespace mote {
 /// where there is no spacing to take a radius from.
 void applyRadiusRule(const ParticleSource& source, LoadedSource& loaded);
 
-/// Scale, rotate about x, y, z and translate, in double; radii, whatever their rule, and velocities scale along, and
-/// cross-sections with the square (in mode Peak: densities stay); colour, absorption and emission stay.
-void moveIntoScene(const ParticleSource& source, DensityMode mode, ParticleSet& set);
+/// The file's axes and unit, then the source's scale, rotate about x, y, z and translate, in double; radii, whatever
+/// their rule, and velocities scale along, and cross-sections with the square (in mode Peak: densities stay); colour,
+/// absorption and emission stay.
+void moveIntoScene(const ParticleSource& source, DensityMode mode, LoadedSource& loaded);
 
 }  // namespace mote

@@ -61,12 +61,13 @@ std::optional<std::string> radiusChannel(const ParticleSource& source, const Par
 
 }  // namespace
 
-LoadedSource readSource(const ParticleSource& source, const std::string& path) {
+LoadedSource readSource(const ParticleSource& source, const std::string& path, double framesPerSecond) {
   checkChannelKeys(source);
   const std::unique_ptr<ParticleFile> opened = openFile(source, path);
   const ParticleFile& file = *opened;
   LoadedSource loaded;
   loaded.place = path;
+  loaded.units = fileUnits(source, file, framesPerSecond);
   ParticleSet& set = loaded.set;
   std::vector<ChannelRequest> requests;
 

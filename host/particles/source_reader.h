@@ -8,7 +8,7 @@ namespace mote {
 /// `density` holds. Nothing is checked but that the channels are there and of the right arity. Throws InputError as
 /// openParticleFile and ParticleFile::read do; for a missing file (with the nearest names or frames that exist), and
 /// for a channel that the file lacks (with those it has).
-LoadedSource readSource(const ParticleSource& source, const std::string& path);
+LoadedSource readSource(const ParticleSource& source, const std::string& path, double framesPerSecond);
 
 /// Throws InputError where the radius is to come from a channel that generated particles do not have.
 LoadedSource generateSource(const ParticleSource& source, int frame);

@@ -1,10 +1,14 @@
 // "particles": files and generators, with the channels, radii and places of their particles.
+#include <fmt/format.h>
+
 #include <limits>
 
 #include "host/scene/scene_parts.h"
 
 namespace mote {
 namespace {
+
+constexpr Range kUnit{.min = 0, .max = kMaxLength, .minOpen = true, .unit = "m"};
 
 void readRadius(ObjectReader& source, RadiusRule& rule) {
   const JsonNode* node = source.find("radius");
@@ -21,6 +25,27 @@ void readRadius(ObjectReader& source, RadiusRule& rule) {
   } else if (node->kind != JsonNode::Kind::String || node->text != "auto") {
     source.problem("radius", R"(a number > 0, {"channel":…, "scale":…} or "auto")", node->shown());
   }
+}
+
+void readUnit(ObjectReader& source, std::optional<LengthUnit>& unit) {
+  const JsonNode* node = source.find("unit");
+  if (!node) return;
+  float metres = 1;
+  if (node->kind == JsonNode::Kind::String && node->text == "file") {
+    unit = LengthUnit{.fromFile = true};
+  } else if (node->kind != JsonNode::Kind::Number) {
+    source.problem("unit", R"(the metres that a unit of the file is long, > 0, or "file")", node->shown());
+  } else if (source.number("unit", metres, kUnit)) {
+    unit = LengthUnit{.metres = node->number};
+  }
+}
+
+void readMeaning(ObjectReader& source, ParticleSource& particles) {
+  UpAxis up = UpAxis::Y;
+  if (source.choice<UpAxis>("up", up, {{"y", UpAxis::Y}, {"z", UpAxis::Z}, {"file", UpAxis::File}})) particles.up = up;
+  readUnit(source, particles.unit);
+  source.choice<VelocityTime>("velocity_per", particles.velocityPer,
+                              {{"second", VelocityTime::Second}, {"frame", VelocityTime::Frame}});
 }
 
 void readChannels(ObjectReader& source, std::map<std::string, std::string>& channels) {
@@ -43,6 +68,7 @@ ParticleSource readParticleSource(ObjectReader& object, const std::filesystem::p
   object.integer<std::uint64_t>("seed", source.seed, 0, std::numeric_limits<std::uint64_t>::max());
   readRadius(object, source.radius);
   readChannels(object, source.channels);
+  readMeaning(object, source);
   object.number("density", source.density, atLeast(0));
   object.vector("color", source.color, kShare);
   object.vector("translate", source.translate, kCoordinate);
@@ -58,7 +84,8 @@ ParticleSource readParticleSource(ObjectReader& object, const std::filesystem::p
   }
   object.onlyWhere(!fromFile || generated, "count", R"("count" only beside "generate")");
   object.onlyWhere(!fromFile || generated, "seed", R"("seed" only beside "generate")");
-  object.onlyWhere(!generated || fromFile, "channels", R"("channels" only beside "file")");
+  for (const char* key : {"channels", "up", "unit", "velocity_per"})
+    object.onlyWhere(!generated || fromFile, key, fmt::format("\"{}\" only beside \"file\"", key));
   object.finish();
   return source;
 }

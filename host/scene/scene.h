@@ -24,6 +24,19 @@ struct RadiusRule {
 
 enum class Generator { None, Ball, Cloud, Plume };
 
+/// Which axis of a file points up; ours is y. File: as its metadata say, mirrored where they are left-handed.
+enum class UpAxis { Y, Z, File };
+
+/// How long a file's unit is. Where it is known lengths become metres.
+struct LengthUnit {
+  bool fromFile = false;  ///< as its metadata say
+  double metres = 1;      ///< else this, > 0
+
+  bool operator==(const LengthUnit&) const = default;
+};
+
+enum class VelocityTime { Second, Frame };
+
 struct ParticleSource {
   std::string pointer;  ///< where it stands in the scene, "/particles/0": the place of messages
   std::string file;     ///< path as opened (relative paths resolved), may hold ####; empty if generated
@@ -31,9 +44,12 @@ struct ParticleSource {
   std::uint64_t count = 0;  ///< generated particles, 1 … 4e9
   std::uint64_t seed = 0;
   RadiusRule radius;
-  std::map<std::string, std::string> channels;  ///< ours → theirs
-  float density = 1;                            ///< used where the file has no Density
-  vec3 color{1};                                ///< used where the file has no Color
+  std::map<std::string, std::string> channels;      ///< ours → theirs
+  std::optional<UpAxis> up;                         ///< of the file; none: y
+  std::optional<LengthUnit> unit;                   ///< of the file; none: as long as the scene's
+  VelocityTime velocityPer = VelocityTime::Second;  ///< what the file's velocities are per
+  float density = 1;                                ///< used where the file has no Density
+  vec3 color{1};                                    ///< used where the file has no Color
   vec3 translate{0}, rotate{0};  ///< rotate: degrees about x, then y, then z; order: scale, rotate, translate
   float scale = 1;               ///< > 0; radii and velocities scale with it, cross-sections with its square
 
