@@ -30,6 +30,13 @@ ParticleSource fileSource(const std::string& path) {
   return source;
 }
 
+/// What --strict asks for.
+LoadRules strictly() {
+  LoadRules rules;
+  rules.strict = true;
+  return rules;
+}
+
 /// Three particles with every channel.
 struct Sample {
   std::vector<vec3> position{{1, 0, 0}, {0, 2, 0}, {0, 0, 3}}, color{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
@@ -252,15 +259,15 @@ TEST(ParticleLoader, RefusesBadAbsorptionAndEmission) {
   Glowing glowing;
   glowing.absorption[1].z = -0.5f;
   glowing.write(path);
-  expectRefused([&] { loadParticles({fileSource(path)}, 1); },
+  expectRefused([&] { loadParticles({fileSource(path)}, 1, strictly()); },
                 {"a.prt: particle 1: absorption", "finite numbers ≥ 0", "(1, 0, -0.5)"});
   glowing.absorption[1].z = std::numeric_limits<float>::quiet_NaN();
   glowing.write(path);
-  expectRefused([&] { loadParticles({fileSource(path)}, 1); }, {"particle 1: absorption", "nan"});
+  expectRefused([&] { loadParticles({fileSource(path)}, 1, strictly()); }, {"particle 1: absorption", "nan"});
   glowing = {};
   glowing.emission[2].x = std::numeric_limits<float>::infinity();
   glowing.write(path);
-  expectRefused([&] { loadParticles({fileSource(path)}, 1); }, {"particle 2: emission", "inf"});
+  expectRefused([&] { loadParticles({fileSource(path)}, 1, strictly()); }, {"particle 2: emission", "inf"});
 }
 
 TEST(ParticleLoader, KeepsTwoUniformColoursApart) {
@@ -312,7 +319,7 @@ TEST(ParticleLoader, RefusesBadParticlesByIndex) {
     Sample sample;
     spoil(sample);
     sample.write(path);
-    expectRefused([&] { loadParticles({fileSource(path)}, 1); }, words);
+    expectRefused([&] { loadParticles({fileSource(path)}, 1, strictly()); }, words);
   };
   refused([&](Sample& s) { s.position[1].y = nan; }, {"a.prt: particle 1: position", "nan"});
   refused([&](Sample& s) { s.position[2].x = inf, s.position[0].z = -inf; }, {"particle 0: position", "-inf"});
@@ -333,7 +340,7 @@ TEST(ParticleLoader, RefusesDoublePositionsBeyondFloat) {
   writePrt(folder.file("a.prt"), columns);
   ParticleSource source = fileSource(folder.file("a.prt"));
   source.channels["Position"] = "P64";
-  expectRefused([&] { loadParticles({source}, 1); }, {"particle 1: position", "inf"});
+  expectRefused([&] { loadParticles({source}, 1, strictly()); }, {"particle 1: position", "inf"});
 }
 
 TEST(ParticleLoader, RefusesWhatScalingMakesInfinite) {
@@ -343,7 +350,7 @@ TEST(ParticleLoader, RefusesWhatScalingMakesInfinite) {
   sample.write(folder.file("a.prt"));
   ParticleSource source = fileSource(folder.file("a.prt"));
   source.scale = 1e10f;
-  expectRefused([&] { loadParticles({source}, 1); }, {"particle 1: position in the scene"});
+  expectRefused([&] { loadParticles({source}, 1, strictly()); }, {"particle 1: position in the scene"});
 }
 
 TEST(ParticleLoader, RefusesNoParticlesAtAll) {

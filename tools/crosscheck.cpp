@@ -7,7 +7,6 @@
 #include "host/core/log.h"
 #include "host/core/output_file.h"
 #include "host/image/compare.h"
-#include "host/scene/scene_reader.h"
 #include "tools/render.h"
 
 namespace mote {
@@ -205,7 +204,7 @@ void print(const Verdict& verdict, std::size_t particles) {
 }
 
 void crosscheck(const CrosscheckOptions& options, const CommonOptions& common, int& exitCode) {
-  Scene scene = readScene(options.scene.scene, options.scene.overrides);
+  Scene scene = openScene(options.scene);
   if (!options.report.empty()) {
     const OutputFile probe(options.report);
   }

@@ -6,7 +6,6 @@
 #include "host/core/parallel.h"
 #include "host/particles/formats/prt_writer.h"
 #include "host/scene/frame_path.h"
-#include "host/scene/scene_reader.h"
 #include "tools/render.h"
 
 namespace mote {
@@ -52,7 +51,7 @@ void writeLit(const std::string& path, const Frame& frame, const LitParticles& l
 }
 
 void light(const LightOptions& options, const CommonOptions& common) {
-  Scene scene = readScene(options.scene.scene, options.scene.overrides);
+  Scene scene = openScene(options.scene);
   const int number = options.frameGiven ? options.frame : scene.frames.first;
   const std::string path = framePath(options.output, number);
   { const OutputFile probe(path); }  // before any work

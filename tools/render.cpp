@@ -11,7 +11,6 @@
 #include "host/core/timer.h"
 #include "host/image/png.h"
 #include "host/scene/frame_path.h"
-#include "host/scene/scene_reader.h"
 
 namespace mote {
 namespace {
@@ -87,7 +86,7 @@ void renderFrame(Scene& scene, int number, const RenderOptions& options, FrameLo
 }
 
 void render(const RenderOptions& options, const CommonOptions& common) {
-  Scene scene = readScene(options.scene.scene, options.scene.overrides);
+  Scene scene = openScene(options.scene);
   applyFlags(options, scene);
   parseExposure(options.exposure);
   checkOutputs(options, scene);

@@ -17,10 +17,13 @@ namespace mote {
 struct SceneOptions {
   std::string scene;
   std::vector<std::string> overrides;  ///< --set
+  bool strict = false;
 };
 
-/// Adds SCENE and --set.
+/// Adds SCENE, --set and --strict.
 void addSceneOptions(CLI::App& command, SceneOptions& options);
+/// Reads the scene and changes it as the options say. Throws InputError as readScene does.
+Scene openScene(const SceneOptions& options);
 
 /// "cpu", "gpu" or "auto"; throws InputError naming `flag` otherwise. Empty keeps `fallback`.
 Backend parseBackend(const std::string& flag, const std::string& text, Backend fallback);

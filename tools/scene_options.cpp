@@ -6,6 +6,7 @@
 
 #include "host/core/error.h"
 #include "host/image/exr.h"
+#include "host/scene/scene_reader.h"
 #include "host/splat/splat.h"
 #include "tools/render.h"
 
@@ -17,6 +18,14 @@ void addSceneOptions(CLI::App& command, SceneOptions& options) {
       ->type_name("/POINTER=VALUE")
       ->expected(1)
       ->take_all();
+  command.add_flag("--strict", options.strict,
+                   "Refuse particles that are not finite or of no size, instead of leaving them out with a warning");
+}
+
+Scene openScene(const SceneOptions& options) {
+  Scene scene = readScene(options.scene, options.overrides);
+  scene.inputs.strict = options.strict;
+  return scene;
 }
 
 Backend parseBackend(const std::string& flag, const std::string& text, Backend fallback) {

@@ -1,6 +1,8 @@
 // The particles of one source on their way into the scene.
 #pragma once
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "host/particles/file_units.h"
 #include "host/particles/particle_set.h"
@@ -12,6 +14,8 @@ struct LoadedSource {
   ParticleSet set;
   std::string place;  ///< what messages about them start with: the file's path, or where the source stands
   bool hasColor = false;
+  std::size_t count = 0;             ///< particles of the file, those that were left out included
+  std::vector<std::uint64_t> index;  ///< which of them each particle is; empty: none was left out
   FileUnits units;
 };
 

@@ -38,7 +38,8 @@ std::vector<vec3> restOfColor(const ParticleSet& set, const vec3& uniformColor) 
 void alignChannels(const std::vector<ParticleSource>& sources, std::vector<LoadedSource>& parts, vec3& uniformColor) {
   const auto any = [&](auto&& has) { return std::any_of(parts.begin(), parts.end(), has); };
   const bool velocity = any([](const LoadedSource& p) { return !p.set.velocity.empty(); });
-  const bool id = any([](const LoadedSource& p) { return !p.set.id.empty(); });
+  // Where particles were left out the index no longer says which is which from frame to frame: that in the file does.
+  const bool id = any([](const LoadedSource& p) { return !p.set.id.empty() || !p.index.empty(); });
   const bool absorption = any([](const LoadedSource& p) { return !p.set.absorption.empty(); });
   const bool emission = any([](const LoadedSource& p) { return !p.set.emission.empty(); });
   uniformColor = sources[0].color;
@@ -53,9 +54,10 @@ void alignChannels(const std::vector<ParticleSource>& sources, std::vector<Loade
     if (velocity && set.velocity.empty()) set.velocity.assign(set.size(), vec3(0));
     if (id && set.id.empty()) {
       set.id.resize(set.size());
-      for (std::size_t i = 0; i < set.size(); ++i) set.id[i] = before + i;
+      const std::vector<std::uint64_t>& index = parts[k].index;
+      for (std::size_t i = 0; i < set.size(); ++i) set.id[i] = before + (index.empty() ? i : index[i]);
     }
-    before += set.size();
+    before += parts[k].count;
   }
 }
 
@@ -90,10 +92,10 @@ ParticleSet loadParticles(const std::vector<ParticleSource>& sources, int frame,
     if (openedFiles && !path.empty()) openedFiles->push_back(path);
     LoadedSource loaded =
         path.empty() ? generateSource(source, frame) : readSource(source, path, rules.framesPerSecond);
-    checkParticles(loaded, "");
+    checkParticles(loaded, rules.strict, "");
     applyRadiusRule(source, loaded);
     moveIntoScene(source, rules.densityMode, loaded);
-    checkParticles(loaded, " in the scene");  // what was finite in the file may not be after scaling
+    checkParticles(loaded, rules.strict, " in the scene");  // what was finite in the file may not be after scaling
     if (loaded.set.size() == 0) empty += fmt::format("{}{}", empty.empty() ? "" : ", ", loaded.place);
     parts.push_back(std::move(loaded));
   }

@@ -12,10 +12,12 @@ namespace mote {
 struct LoadRules {
   DensityMode densityMode = DensityMode::CrossSection;
   double framesPerSecond = 24;  ///< of velocities per frame
+  bool strict = false;          ///< what is no particle is refused, not left out
 
   LoadRules() = default;
   LoadRules(DensityMode mode) : densityMode(mode) {}  ///< implicit: a mode alone is all that most callers have
-  explicit LoadRules(const Scene& scene) : densityMode(scene.medium.densityMode), framesPerSecond(scene.frames.fps) {}
+  explicit LoadRules(const Scene& scene)
+      : densityMode(scene.medium.densityMode), framesPerSecond(scene.frames.fps), strict(scene.inputs.strict) {}
 };
 
 /// Loads every source for `frame` ('####' in a file name is the frame, see framePath) and merges them in order.
@@ -29,15 +31,17 @@ struct LoadRules {
 /// and cross-sections with the square (in mode Peak: densities stay); colour, absorption and emission stay.
 ///
 /// Where only some sources have Color, Velocity, Emission or ID, the rest get their `color`, zero, zero, and the index
-/// in the result. Where only some have Absorption, the rest get what Color leaves of 1, max(0, 1 − Color): their
-/// extinction is then Density where medium.albedo is 1, and smaller by Density · Color · (1 − albedo) elsewhere. Give
-/// them the channel where that matters.
+/// in the sources, one after the other. Where only some have Absorption, the rest get what Color leaves of 1, max(0, 1
+/// − Color): their extinction is then Density where medium.albedo is 1, and smaller by Density · Color · (1 − albedo)
+/// elsewhere. Give them the channel where that matters.
+///
+/// Particles that are not finite or of no size are left out, with a warning for each source (particle_checks.h); where
+/// no source has an ID, the rest get their index in the sources as one, so that what goes by it stays.
 ///
 /// `openedFiles`, if given, gets the path of every file read. Throws InputError: a missing file (with the nearest names
-/// or frames that exist), a channel that the file lacks (with those it has), no particles at all, a particle whose
-/// position, radius, density, colour, absorption, emission or velocity is not finite, radius ≤ 0, density, absorption
-/// or emission < 0 (with its index and value), no spacing to take a radius from. Costs: that of PrtReader, and 0.02
-/// core-seconds for each million.
+/// or frames that exist), a channel that the file lacks (with those it has), no particles at all, none that is fit or
+/// with `strict` any that is not (with its index and value), no spacing to take a radius from. Costs: that of the
+/// reader, and 0.02 core-seconds for each million.
 ParticleSet loadParticles(const std::vector<ParticleSource>& sources, int frame, const LoadRules& rules = {},
                           std::vector<std::string>* openedFiles = nullptr);
 

@@ -93,6 +93,7 @@ LoadedSource readSource(const ParticleSource& source, const std::string& path, d
   if (const auto name = nameInFile(source, file, "ID"); wanted(source, file, "ID", name))
     requests.push_back({name.theirs, &set.id});
   file.read(requests);
+  loaded.count = set.size();
   if (set.density.empty()) set.density.assign(set.size(), source.density);
   return loaded;
 }
@@ -104,6 +105,7 @@ LoadedSource generateSource(const ParticleSource& source, int frame) {
     throw InputError(loaded.place, "radius/channel", "'Radius', the only one that generated particles have",
                      fmt::format("'{}'", source.radius.channel));
   loaded.set = generateParticles(source.generate, source.count, source.seed, frame);
+  loaded.count = loaded.set.size();
   return loaded;
 }
 

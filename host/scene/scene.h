@@ -191,6 +191,13 @@ struct Frames {
   bool operator==(const Frames&) const = default;
 };
 
+/// What is done with files that are not as they should be: from flags, no part of a scene's text.
+struct InputRules {
+  bool strict = false;  ///< particles that are not finite or of no size are refused; else left out with a warning
+
+  bool operator==(const InputRules&) const = default;
+};
+
 struct Scene {
   std::string path;  ///< as given; the place in messages
   std::vector<ParticleSource> particles;
@@ -203,6 +210,7 @@ struct Scene {
   View view;
   Output output;
   Frames frames;
+  InputRules inputs;
 
   bool operator==(const Scene&) const = default;
 };
