@@ -11,6 +11,7 @@
 #include "host/lighting/auto_subsample.h"
 #include "host/lighting/medium.h"
 #include "host/scene/fitting.h"
+#include "host/scene/origin.h"
 #include "host/solids/mesh.h"
 
 namespace mote {
@@ -18,7 +19,7 @@ namespace {
 
 layout::Light toLight(const LightSource& source) {
   const bool directional = source.type == LightType::Directional;
-  return {.position = source.position,
+  return {.position = vec3(source.position),
           .type = directional                      ? layout::kLightDirectional
                   : source.type == LightType::Spot ? layout::kLightSpot
                                                    : layout::kLightPoint,
@@ -192,6 +193,7 @@ Frame prepareFrame(Scene& scene, FrameFiles files, FrameStats& stats) {
   frame.number = stats.frame = number;
   for (const std::string& warning : files.warnings) logWarning(warning);
   frame.particles = std::move(files.particles);
+  moveOrigin(scene, frame.particles.origin);
   frame.meshes = std::move(files.meshes);
   frame.blank = std::move(files.sprites);
   stats.inputs = std::move(files.inputs);
@@ -225,6 +227,7 @@ Frame prepareFrame(Scene& scene, FrameFiles files, FrameStats& stats) {
                            stats.subsample, stats.particles));
   stats.lights = frame.lights.size();
   stats.radius = radiusRange(frame.particles);
+  stats.origin = frame.particles.origin;
   stats.seconds["octree"] = timer.lap();
   return frame;
 }

@@ -30,7 +30,9 @@ FrameFiles loadFrame(const Scene& scene, int number, FramePurpose purpose) {
   std::vector<std::string> paths;
   files.particles = loadParticles(scene.particles, number, LoadRules(scene), &paths);
   for (const Solid& solid : scene.solids) {
-    files.meshes.push_back(loadMesh(solid, number));
+    Solid placed = solid;
+    placed.translate -= files.particles.origin;
+    files.meshes.push_back(loadMesh(placed, number));
     paths.push_back(framePath(solid.file, number));
   }
   if (purpose == FramePurpose::Picture) files.sprites = readSprites(scene, paths);

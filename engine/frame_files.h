@@ -26,7 +26,8 @@ struct FrameFiles {
   double seconds = 0;  ///< that loading took
 };
 
-/// Loads them. Of the scene it looks at sources, solids, view and density mode only. Throws InputError as readers do;
+/// Loads them. Of the scene it looks at sources, solids, view, density mode,
+/// frame rate, origin and rules for inputs only. Throws InputError as readers do;
 /// warnings are in the result, not yet logged.
 FrameFiles loadFrame(const Scene& scene, int number, FramePurpose purpose);
 

@@ -23,8 +23,8 @@ constexpr std::size_t kBlock = 1 << 14;
 layout::SplatCamera cameraAtFrame(const Scene& scene, double frame, layout::uint falloff) {
   const Camera camera = cameraAt(scene.camera, frame);
   const Output& output = scene.output;
-  layout::SplatCamera result = makeSplatCamera(camera.position, camera.target, camera.up, camera.fov, camera.near,
-                                               camera.far, output.size.x, output.size.y, falloff);
+  layout::SplatCamera result = makeSplatCamera(vec3(camera.position), vec3(camera.target), camera.up, camera.fov,
+                                               camera.near, camera.far, output.size.x, output.size.y, falloff);
   if (camera.projection == Projection::Orthographic) makeOrthographic(result, camera.height);
   setPixelAspect(result, output.pixelAspect);
   result.apertureRadius = camera.apertureRadius;

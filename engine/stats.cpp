@@ -55,6 +55,7 @@ Json reproducible(const FrameStats& frame) {
        {{"fraction", frame.subsample}, {"error", frame.subsampleError ? Json(*frame.subsampleError) : Json(nullptr)}}},
       {"light_error", std::move(methods)},
       {"radius", {{"min", frame.radius.min}, {"mean", frame.radius.mean}, {"max", frame.radius.max}}},
+      {"origin", {frame.origin.x, frame.origin.y, frame.origin.z}},
       {"inputs", std::move(inputs)},
       {"warnings", frame.warnings}};
 }

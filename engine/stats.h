@@ -35,6 +35,7 @@ struct FrameStats {
   double subsample = 1;                  ///< share of the particles in the octree …
   std::optional<double> subsampleError;  ///< … and its mean |ΔT|: 0 for all, else empty unless measured on this frame
   RadiusRange radius;
+  dvec3 origin{0};                   ///< what coordinates are measured from, those of the EXR header's matrices too
   std::vector<LightMethod> methods;  ///< of the particles' light; empty where nothing but exact sums was allowed
   std::vector<FrameInput> inputs;
   std::vector<std::string> warnings;

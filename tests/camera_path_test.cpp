@@ -67,7 +67,7 @@ TEST(CameraPath, StandsStillOutsideItsKeysAndWithOneOrNone) {
   // Positions end at 11.25, a key before the last.
   EXPECT_EQ(cameraAt(camera, 11.5).position, *camera.keys[4].position);
   camera.keys = {positionAt(4, vec3(7, 8, 9))};
-  for (const double frame : {-2.0, 4.0, 4.5, 30.0}) EXPECT_EQ(cameraAt(camera, frame).position, vec3(7, 8, 9));
+  for (const double frame : {-2.0, 4.0, 4.5, 30.0}) EXPECT_EQ(cameraAt(camera, frame).position, dvec3(7, 8, 9));
   camera.keys.clear();
   EXPECT_EQ(cameraAt(camera, 17.5), camera);
 }

@@ -146,7 +146,7 @@ TEST(Fitting, PlacesTheKeyLightBehindAboveAndLeftAtUnitRadiance) {
   ASSERT_EQ(scene.lights.size(), 1u);
   const LightSource& key = scene.lights[0];
   EXPECT_EQ(key.name, "key");
-  const vec3 offset = key.position - box.centre();
+  const vec3 offset = vec3(key.position) - box.centre();
   const vec3 view = glm::normalize(scene.camera.target - scene.camera.position);
   EXPECT_LT(glm::dot(offset, glm::cross(view, scene.camera.up)), 0);
   EXPECT_GT(offset.y, 0);

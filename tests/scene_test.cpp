@@ -121,7 +121,7 @@ TEST(SceneReader, ReadsEveryKey) {
                                {"Absorption", "a"}, {"Density", "rho"}, {"Emission", "e"}, {"ID", "n"}}));
   EXPECT_EQ(file.density, 3);
   EXPECT_EQ(file.color, vec3(0.1f, 0.2f, 0.3f));
-  EXPECT_EQ(file.translate, vec3(1, 2, 3));
+  EXPECT_EQ(file.translate, dvec3(1, 2, 3));
   EXPECT_EQ(file.rotate, vec3(4, 5, 6));
   EXPECT_EQ(file.scale, 7);
   EXPECT_EQ(scene.particles[1].generate, Generator::Cloud);

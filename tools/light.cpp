@@ -47,7 +47,11 @@ void writeLit(const std::string& path, const Frame& frame, const LitParticles& l
       columns.push_back(PrtColumn::of(name, std::span<const vec3>(colored[l])));
     }
   }
-  writePrt(path, columns);
+  // Positions are float32, measured from here.
+  const dvec3 origin = frame.particles.origin;
+  std::vector<Metadata> metadata;
+  if (origin != dvec3(0)) metadata.push_back(Metadata::float64s("", "Origin", {origin.x, origin.y, origin.z}));
+  writePrt(path, columns, metadata);
 }
 
 void light(const LightOptions& options, const CommonOptions& common) {

@@ -17,6 +17,7 @@ struct LoadedSource {
   std::size_t count = 0;             ///< particles of the file, those that were left out included
   std::vector<std::uint64_t> index;  ///< which of them each particle is; empty: none was left out
   FileUnits units;
+  dvec3 centre{0};  ///< what the set's positions are measured from, in the file's units; once moved, in the scene's
 };
 
 /// Where a source stands in the scene, for messages.

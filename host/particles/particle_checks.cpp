@@ -27,7 +27,10 @@ struct Check {
 };
 
 bool isFinite(const vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-std::string text(const vec3& v) { return fmt::format("({}, {}, {})", v.x, v.y, v.z); }
+template <class V>
+std::string text(const V& v) {
+  return fmt::format("({}, {}, {})", v.x, v.y, v.z);
+}
 std::string text(float v) { return fmt::format("{}", v); }
 
 template <class T, class Bad>
@@ -40,10 +43,11 @@ Check checkOf(const std::vector<T>& values, const char* what, const char* expect
 }
 
 /// In the order in which a particle's flaws are looked for. They hold on to the set's arrays.
-std::vector<Check> checksOf(const ParticleSet& set) {
+std::vector<Check> checksOf(const LoadedSource& loaded) {
+  const ParticleSet& set = loaded.set;
   const auto notFinite = [](const vec3& v) { return !isFinite(v); };
   const auto noAmount = [](const vec3& v) { return !isFinite(v) || v.x < 0 || v.y < 0 || v.z < 0; };
-  return {
+  std::vector<Check> checks = {
       checkOf(set.position, "position", "numbers that are finite in float32", notFinite),
       checkOf(set.radius, "radius", "a finite number > 0", [](float r) { return !std::isfinite(r) || r <= 0; }),
       checkOf(set.density, "density", "a finite number ≥ 0", [](float d) { return !std::isfinite(d) || d < 0; }),
@@ -52,6 +56,9 @@ std::vector<Check> checksOf(const ParticleSet& set) {
       checkOf(set.emission, "emission", "finite numbers ≥ 0", noAmount),
       checkOf(set.velocity, "velocity", "numbers that are finite in float32", notFinite),
   };
+  if (loaded.centre != dvec3(0))
+    checks[0].value = [&loaded](std::size_t i) { return text(dvec3(loaded.set.position[i]) + loaded.centre); };
+  return checks;
 }
 
 /// Index of the first particle for which it does not hold, or its count.
@@ -125,7 +132,7 @@ void leaveOut(LoadedSource& loaded, const std::vector<std::uint8_t>& flawed) {
 }  // namespace
 
 void checkParticles(LoadedSource& loaded, bool strict, const char* when) {
-  const std::vector<Check> checks = checksOf(loaded.set);
+  const std::vector<Check> checks = checksOf(loaded);
   const auto wrong = std::find_if(checks.begin(), checks.end(), [](const Check& c) { return firstBad(c) < c.count; });
   if (wrong == checks.end()) return;
   const std::size_t first = firstBad(*wrong), all = loaded.set.size();

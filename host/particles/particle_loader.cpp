@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
 #include "host/core/error.h"
@@ -12,6 +13,7 @@
 #include "host/particles/placement.h"
 #include "host/particles/source_reader.h"
 #include "host/scene/frame_path.h"
+#include "host/scene/origin.h"
 
 namespace mote {
 namespace {
@@ -80,13 +82,43 @@ ParticleSet merged(const std::vector<ParticleSource>& sources, std::vector<Loade
   return all;
 }
 
+// A float32's steps at a particle may be this share of the mean radius: what is drawn and what rays meet is then off by
+// less than the noise of the particles themselves.
+constexpr double kSpacingShare = 1e-3;
+
+/// What all sources are measured from together, so that they stay in register: (0, 0, 0) unless float32 is too coarse
+/// for their radii there, and finer elsewhere.
+dvec3 bestOrigin(const std::vector<LoadedSource>& parts, const std::vector<Placement>& places) {
+  SceneBox box;
+  double radii = 0;
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const ParticleSet& set = parts[k].set;
+    box.add(sceneBox(parts[k], places[k]));
+    radii += static_cast<double>(radiusRange(set).mean) * places[k].scale * static_cast<double>(set.size());
+    count += set.size();
+  }
+  if (box.empty()) return dvec3(0);
+  const dvec3 far = glm::max(glm::abs(box.lo), glm::abs(box.hi));
+  const double farthest = std::max({far.x, far.y, far.z}), radius = radii / static_cast<double>(count);
+  const double step = std::exp2(std::floor(std::log2(farthest)) - 23);  // of float32 there
+  if (!(step > kSpacingShare * radius)) return dvec3(0);
+  const dvec3 origin = originOf(box.lo, box.hi, radius);
+  if (origin != dvec3(0))
+    logWarning(
+        fmt::format("coordinates reach {:g}, where float32 goes in steps of {:g} and the mean radius is {:g}: all "
+                    "are measured from ({}, {}, {}) instead (\"origin\")",
+                    farthest, step, radius, origin.x, origin.y, origin.z));
+  return origin;
+}
+
 }  // namespace
 
 ParticleSet loadParticles(const std::vector<ParticleSource>& sources, int frame, const LoadRules& rules,
                           std::vector<std::string>* openedFiles) {
   if (sources.empty()) throw InputError("particles", "", "at least one source", "none");
   std::vector<LoadedSource> parts;
-  std::string empty;
+  std::vector<Placement> places;
   for (const ParticleSource& source : sources) {
     const std::string path = source.file.empty() ? "" : framePath(source.file, frame);
     if (openedFiles && !path.empty()) openedFiles->push_back(path);
@@ -94,12 +126,18 @@ ParticleSet loadParticles(const std::vector<ParticleSource>& sources, int frame,
         path.empty() ? generateSource(source, frame) : readSource(source, path, rules.framesPerSecond);
     checkParticles(loaded, rules.strict, "");
     applyRadiusRule(source, loaded);
-    moveIntoScene(source, rules.densityMode, loaded);
-    checkParticles(loaded, rules.strict, " in the scene");  // what was finite in the file may not be after scaling
-    if (loaded.set.size() == 0) empty += fmt::format("{}{}", empty.empty() ? "" : ", ", loaded.place);
+    places.push_back(placementOf(source, rules.densityMode, loaded));
     parts.push_back(std::move(loaded));
   }
+  const dvec3 origin = rules.origin ? *rules.origin : bestOrigin(parts, places);
+  std::string empty;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    moveIntoScene(places[k], origin, parts[k]);
+    checkParticles(parts[k], rules.strict, " in the scene");  // what was finite in the file may not be after scaling
+    if (parts[k].set.size() == 0) empty += fmt::format("{}{}", empty.empty() ? "" : ", ", parts[k].place);
+  }
   ParticleSet all = merged(sources, parts);
+  all.origin = origin;
   if (all.size() == 0) throw InputError(empty, "", "at least one particle", "none");
   if (!empty.empty()) logWarning(fmt::format("{}: holds no particles in frame {}", empty, frame));
   return all;

@@ -1,5 +1,6 @@
 // The particles of one frame of a scene: sources read or generated, checked, moved into scene space and put together.
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,11 +14,15 @@ struct LoadRules {
   DensityMode densityMode = DensityMode::CrossSection;
   double framesPerSecond = 24;  ///< of velocities per frame
   bool strict = false;          ///< what is no particle is refused, not left out
+  std::optional<dvec3> origin;  ///< what positions are measured from; none: what is best
 
   LoadRules() = default;
   LoadRules(DensityMode mode) : densityMode(mode) {}  ///< implicit: a mode alone is all that most callers have
   explicit LoadRules(const Scene& scene)
-      : densityMode(scene.medium.densityMode), framesPerSecond(scene.frames.fps), strict(scene.inputs.strict) {}
+      : densityMode(scene.medium.densityMode),
+        framesPerSecond(scene.frames.fps),
+        strict(scene.inputs.strict),
+        origin(scene.origin) {}
 };
 
 /// Loads every source for `frame` ('####' in a file name is the frame, see framePath) and merges them in order.
@@ -34,6 +39,11 @@ struct LoadRules {
 /// in the sources, one after the other. Where only some have Absorption, the rest get what Color leaves of 1, max(0, 1
 /// − Color): their extinction is then Density where medium.albedo is 1, and smaller by Density · Color · (1 − albedo)
 /// elsewhere. Give them the channel where that matters.
+///
+/// Positions are measured from `origin`, the same for all sources. Unless the rules name it that is (0, 0, 0), except
+/// where float32's steps there are more than 1/1000 of the mean radius and the particles lie far enough off the scene's
+/// 0 for another to be better (originOf): then that, with a warning. Positions in double, the source's `translate` and
+/// all else are double until the origin has been subtracted.
 ///
 /// Particles that are not finite or of no size are left out, with a warning for each source (particle_checks.h); where
 /// no source has an ID, the rest get their index in the sources as one, so that what goes by it stays.

@@ -13,7 +13,7 @@ namespace mote {
 /// Where there is absorption, a particle's extinction per colour channel is
 ///   density · (color · medium.albedo + absorption) · medium.extinction, else density · medium.extinction.
 struct ParticleSet {
-  std::vector<vec3> position;  ///< centre [scene units], finite
+  std::vector<vec3> position;  ///< centre − origin [scene units], finite
   std::vector<float> radius;   ///< support radius r [scene units], finite, > 0
   std::vector<float> density;  ///< Density: cross-section [scene units²], in mode `peak` optical depth; finite, ≥ 0
   std::vector<vec3> color;     ///< scattering albedo, RGB; empty: all of them `uniformColor`
@@ -22,6 +22,7 @@ struct ParticleSet {
   std::vector<vec3> absorption;   ///< RGB, relative to `density`, finite, ≥ 0; empty: no source has it
   std::vector<vec3> emission;     ///< radiance, RGB [W/(m² sr)], finite, ≥ 0; empty: no source has it
   vec3 uniformColor{1};
+  dvec3 origin{0};  ///< of scene space, what positions are measured from
 
   std::size_t size() const { return position.size(); }
   Bounds bounds() const;         ///< of the centres

@@ -36,29 +36,55 @@ void applyRadiusRule(const ParticleSource& source, LoadedSource& loaded) {
   set.radius.assign(set.size(), radius);
 }
 
-void moveIntoScene(const ParticleSource& source, DensityMode mode, LoadedSource& loaded) {
-  ParticleSet& set = loaded.set;
+Placement placementOf(const ParticleSource& source, DensityMode mode, const LoadedSource& loaded) {
   const FileUnits& units = loaded.units;
-  if (units.velocity != 1)
-    for (vec3& v : set.velocity) v = vec3(dvec3(v) * units.velocity);
-  const bool stays = source.scale == 1 && source.rotate == vec3(0) && source.translate == vec3(0);
-  if (stays && units.none()) return;  // exact, not merely close
+  Placement place;
+  place.scale = source.scale * units.length;
+  place.area = mode == DensityMode::Peak ? 1 : place.scale * place.scale;
   dmat4 rotation(1);
-  for (const int axis : {2, 1, 0}) {  // Rz · Ry · Rx: x is applied first
-    dvec3 about(0);
-    about[axis] = 1;
-    rotation = glm::rotate(rotation, glm::radians(static_cast<double>(source.rotate[axis])), about);
-  }
-  const double scale = source.scale * units.length;
-  const glm::dmat3 linear = (glm::dmat3(rotation) * scale) * units.axes;
-  const dvec3 translate(source.translate);
-  const double area = mode == DensityMode::Peak ? 1 : scale * scale;
+  if (source.rotate != vec3(0))
+    for (const int axis : {2, 1, 0}) {  // Rz · Ry · Rx: x is applied first
+      dvec3 about(0);
+      about[axis] = 1;
+      rotation = glm::rotate(rotation, glm::radians(static_cast<double>(source.rotate[axis])), about);
+    }
+  place.linear = (glm::dmat3(rotation) * place.scale) * units.axes;
+  place.shift = place.linear * loaded.centre + source.translate;
+  place.stays = source.scale == 1 && source.rotate == vec3(0) && units.none();
+  place.velocity = units.velocity;
+  return place;
+}
+
+SceneBox sceneBox(const LoadedSource& loaded, const Placement& place) {
+  const std::vector<vec3>& position = loaded.set.position;
+  std::vector<SceneBox> boxes((position.size() + kGrain - 1) / kGrain);
+  parallelBlocks(position.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    SceneBox& box = boxes[begin / kGrain];
+    for (std::size_t i = begin; i < end; ++i) {
+      const dvec3 at = place.linear * dvec3(position[i]) + place.shift;
+      box.lo = glm::min(box.lo, at), box.hi = glm::max(box.hi, at);
+    }
+  });
+  SceneBox all;
+  for (const SceneBox& box : boxes) all.add(box);
+  return all;
+}
+
+void moveIntoScene(const Placement& place, const dvec3& origin, LoadedSource& loaded) {
+  ParticleSet& set = loaded.set;
+  const glm::dmat3 velocity = place.linear * place.velocity;
+  const dvec3 shift = place.shift - origin;
+  loaded.centre = origin;
+  if (place.stays && place.velocity != 1)
+    for (vec3& v : set.velocity) v = vec3(dvec3(v) * place.velocity);
+  if (place.stays && shift == dvec3(0)) return;  // exact, not merely close
   parallelBlocks(set.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      set.position[i] = vec3(linear * dvec3(set.position[i]) + translate);
-      set.radius[i] = static_cast<float>(set.radius[i] * scale);
-      set.density[i] = static_cast<float>(set.density[i] * area);
-      if (!set.velocity.empty()) set.velocity[i] = vec3(linear * dvec3(set.velocity[i]));
+      set.position[i] = vec3(place.linear * dvec3(set.position[i]) + shift);
+      if (place.stays) continue;
+      set.radius[i] = static_cast<float>(set.radius[i] * place.scale);
+      set.density[i] = static_cast<float>(set.density[i] * place.area);
+      if (!set.velocity.empty()) set.velocity[i] = vec3(velocity * dvec3(set.velocity[i]));
     }
   });
 }

@@ -2,16 +2,23 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <limits>
 #include <optional>
 
 #include "host/core/error.h"
+#include "host/core/parallel.h"
 #include "host/particles/generate.h"
 #include "host/particles/our_channels.h"
 #include "host/scene/missing_file.h"
+#include "host/scene/origin.h"
 
 namespace mote {
 namespace {
+
+constexpr std::size_t kGrain = 1 << 15;
 
 [[noreturn]] void throwMissingChannel(const ParticleSource& source, const ParticleFile& file, const std::string& field,
                                       const std::string& name) {
@@ -59,6 +66,33 @@ std::optional<std::string> radiusChannel(const ParticleSource& source, const Par
   return wanted(source, file, "Radius", name) ? std::optional(name.theirs) : std::nullopt;
 }
 
+/// Whether a number may need more than float32 has.
+bool isWide(NumberType type) { return numberSize(type) >= 4 && type != NumberType::F32; }
+
+/// Positions that may lie far from the origin: as floats about a centre of their own where that keeps more of them.
+void takePositions(const std::vector<dvec3>& from, LoadedSource& loaded) {
+  struct Box {
+    dvec3 lo{std::numeric_limits<double>::infinity()}, hi{-std::numeric_limits<double>::infinity()};
+  };
+  std::vector<Box> boxes((from.size() + kGrain - 1) / kGrain);
+  parallelBlocks(from.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    Box& box = boxes[begin / kGrain];
+    for (std::size_t i = begin; i < end; ++i) {
+      const dvec3 size = glm::abs(from[i]);  // what is no number or none of float32 will be left out
+      if (!(std::max({size.x, size.y, size.z}) <= std::numeric_limits<float>::max())) continue;
+      if (std::isnan(size.y) || std::isnan(size.z)) continue;
+      box.lo = glm::min(box.lo, from[i]), box.hi = glm::max(box.hi, from[i]);
+    }
+  });
+  Box all;
+  for (const Box& box : boxes) all.lo = glm::min(all.lo, box.lo), all.hi = glm::max(all.hi, box.hi);
+  if (all.lo.x <= all.hi.x) loaded.centre = originOf(all.lo, all.hi);
+  loaded.set.position.resize(from.size());
+  parallelBlocks(from.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) loaded.set.position[i] = vec3(from[i] - loaded.centre);
+  });
+}
+
 }  // namespace
 
 LoadedSource readSource(const ParticleSource& source, const std::string& path, double framesPerSecond) {
@@ -74,7 +108,13 @@ LoadedSource readSource(const ParticleSource& source, const std::string& path, d
   const ChannelName position = nameInFile(source, file, "Position"), velocity = nameInFile(source, file, "Velocity");
   if (!wanted(source, file, "Position", position)) throwMissingChannel(source, file, "", position.theirs);
   requireVector(file, position.theirs);
-  requests.push_back({position.theirs, &set.position});
+  const bool exact = isWide(file.channel(position.theirs)->type);
+  std::vector<dvec3> wide;
+  if (exact) {
+    requests.push_back({position.theirs, &wide});
+  } else {
+    requests.push_back({position.theirs, &set.position});
+  }
   if (const auto radius = radiusChannel(source, file)) requests.push_back({*radius, &set.radius});
   if (const auto name = nameInFile(source, file, "Density"); wanted(source, file, "Density", name))
     requests.push_back({name.theirs, &set.density});
@@ -93,6 +133,7 @@ LoadedSource readSource(const ParticleSource& source, const std::string& path, d
   if (const auto name = nameInFile(source, file, "ID"); wanted(source, file, "ID", name))
     requests.push_back({name.theirs, &set.id});
   file.read(requests);
+  if (exact) takePositions(wide, loaded);
   loaded.count = set.size();
   if (set.density.empty()) set.density.assign(set.size(), source.density);
   return loaded;

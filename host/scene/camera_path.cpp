@@ -105,12 +105,12 @@ Camera cameraAt(const Camera& camera, double frame) {
 
 float focusDistanceOf(const Camera& camera) {
   if (camera.focusDistance) return *camera.focusDistance;
-  return static_cast<float>(glm::distance(dvec3(camera.position), dvec3(camera.target)));
+  return static_cast<float>(glm::distance(camera.position, camera.target));
 }
 
 std::optional<ViewFault> viewFault(const Camera& camera) {
   using Blame = ViewFault::Blame;
-  const dvec3 up(camera.up), view = dvec3(camera.target) - dvec3(camera.position);
+  const dvec3 up(camera.up), view = camera.target - camera.position;
   if (up == dvec3(0)) return ViewFault{Blame::Up, "a direction that is not zero", "[0, 0, 0]", ""};
   if (view == dvec3(0))
     return ViewFault{Blame::Target, "a target that is not the camera's position", "both at the same place", ""};

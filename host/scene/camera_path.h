@@ -16,8 +16,8 @@ namespace mote {
 /// is continuous between the first key and the last, and what moves steadily from key to key moves steadily in
 /// between. Like every such curve it swings past a key where the motion stops abruptly; a key more holds it.
 ///
-/// Computed in double, then rounded to the camera's floats. The result has no keys; `fitted` marks stay as they are.
-/// Throws InputError where the view is undefined (viewFault), or fov, height or focus distance leave their range.
+/// Computed in double; what the camera has as floats is rounded. The result has no keys; `fitted` marks stay as they
+/// are. Throws InputError where the view is undefined (viewFault), or fov, height or focus distance leave their range.
 /// Cost: proportional to the number of keys, for moments of a frame and not for each particle.
 Camera cameraAt(const Camera& camera, double frame);
 

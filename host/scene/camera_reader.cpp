@@ -21,8 +21,10 @@ void readOptional(ObjectReader& object, std::string_view key, std::optional<floa
   float read = 0;
   if (object.number(key, read, range)) value = read;
 }
-void readOptional(ObjectReader& object, std::string_view key, std::optional<vec3>& value, const Range& range) {
-  vec3 read(0);
+template <class Vector>
+void readOptional(ObjectReader& object, std::string_view key, std::optional<Vector>& value,
+                  const Range& range) requires(Vector::length() == 3) {
+  Vector read(0);
   if (object.vector(key, read, range)) value = read;
 }
 

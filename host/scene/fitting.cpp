@@ -87,6 +87,7 @@ void fitCamera(Camera& camera, double aspect, const Box& box) {
   const Axes axes = axesOf(camera);
   const bool perspective = camera.projection == Projection::Perspective;
   const double distance = perspective ? distanceOf(axes, box, camera.fov, aspect) : 2 * kLeastDistance * box.radius;
+  // Floats, as they are drawn with.
   camera.target = vec3(box.centre);
   camera.position = vec3(box.centre + distance * axes.toCamera);
   if (camera.fittedHeight) camera.height = static_cast<float>(heightOf(axes, box, aspect));
@@ -98,7 +99,7 @@ void fitCamera(Camera& camera, double aspect, const Box& box) {
 
 LightSource keyLight(const Camera& camera, const Box& box) {
   const dvec3 up = glm::normalize(dvec3(camera.up));
-  const dvec3 view = glm::normalize(dvec3(camera.target) - dvec3(camera.position));
+  const dvec3 view = glm::normalize(camera.target - camera.position);
   const dvec3 right = glm::normalize(glm::cross(view, up)), ahead = glm::cross(up, right);
   const double distance = kLightDistance * box.radius;
   LightSource light;
@@ -106,7 +107,7 @@ LightSource keyLight(const Camera& camera, const Box& box) {
   light.type = LightType::Point;
   // Three-quarter back light: edges glow, and the shadows fall toward the viewer.
   light.position = vec3(box.centre + distance * glm::normalize(-0.7 * right + 0.7 * up + 0.8 * ahead));
-  const double d = glm::distance(dvec3(light.position), box.centre);
+  const double d = glm::distance(light.position, box.centre);
   light.strength = static_cast<float>(4 * kPi * d * d);
   return light;
 }

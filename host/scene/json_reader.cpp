@@ -139,6 +139,16 @@ bool ObjectReader::numberAt(const std::string& pointer, const JsonNode& node, fl
   return good;
 }
 
+bool ObjectReader::numberAt(const std::string& pointer, const JsonNode& node, double& value, const Range& range) {
+  const bool good = node.kind == Kind::Number && std::isfinite(node.number) && inside(node.number, range);
+  if (good) {
+    value = node.number;
+  } else {
+    problemAt(node.place, pointer, rangeText("a number", range), node.shown());
+  }
+  return good;
+}
+
 std::optional<std::uint64_t> ObjectReader::wholeNumber(std::string_view key, const JsonNode& node, std::uint64_t min,
                                                        std::uint64_t max, bool isSigned, std::string_view unit) {
   return wholeNumberAt(childPointer(pointer_, key), node, min, max, isSigned, unit);
@@ -195,6 +205,7 @@ bool ObjectReader::vectorAt(std::string_view key, Vector& value, const Range& ra
 }
 
 bool ObjectReader::vector(std::string_view key, vec3& value, Range range) { return vectorAt(key, value, range); }
+bool ObjectReader::vector(std::string_view key, dvec3& value, Range range) { return vectorAt(key, value, range); }
 bool ObjectReader::vector(std::string_view key, vec2& value, Range range) { return vectorAt(key, value, range); }
 
 bool ObjectReader::pair(std::string_view key, ivec2& value, int min, int max, std::string_view unit) {

@@ -81,6 +81,7 @@ class ObjectReader {
   bool text(std::string_view key, std::string& value);
   /// [x, y, z], each in the range.
   bool vector(std::string_view key, vec3& value, Range range);
+  bool vector(std::string_view key, dvec3& value, Range range);
   /// [x, y], each in the range.
   bool vector(std::string_view key, vec2& value, Range range);
   /// [x, y] of whole numbers, each in min … max.
@@ -120,6 +121,7 @@ class ObjectReader {
   void problemAt(JsonPlace place, std::string_view pointer, std::string_view expected, std::string_view got,
                  std::string_view hint = {});
   bool numberAt(const std::string& pointer, const JsonNode& node, float& value, const Range& range);
+  bool numberAt(const std::string& pointer, const JsonNode& node, double& value, const Range& range);
   template <class Vector>
   bool vectorAt(std::string_view key, Vector& value, const Range& range);
   /// The integer as its two's complement bits; min and max converted to 64 bits by the caller's type.

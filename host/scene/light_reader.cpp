@@ -25,9 +25,9 @@ void readDirection(ObjectReader& object, vec3& direction) {
 
 /// Turns the light from its position to the target; without one it shines straight down.
 void readTarget(ObjectReader& object, LightSource& light) {
-  vec3 target(0);
+  dvec3 target(0);
   if (!object.vector("target", target, kCoordinate) || light.type != LightType::Spot) return;
-  const dvec3 way = dvec3(target) - dvec3(light.position);
+  const dvec3 way = target - light.position;
   const double length = glm::length(way);
   if (length > 0) {
     light.direction = vec3(way / length);

@@ -50,8 +50,9 @@ struct ParticleSource {
   VelocityTime velocityPer = VelocityTime::Second;  ///< what the file's velocities are per
   float density = 1;                                ///< used where the file has no Density
   vec3 color{1};                                    ///< used where the file has no Color
-  vec3 translate{0}, rotate{0};  ///< rotate: degrees about x, then y, then z; order: scale, rotate, translate
-  float scale = 1;               ///< > 0; radii and velocities scale with it, cross-sections with its square
+  dvec3 translate{0};
+  vec3 rotate{0};   ///< degrees about x, then y, then z; order: scale, rotate, translate
+  float scale = 1;  ///< > 0; radii and velocities scale with it, cross-sections with its square
 
   bool operator==(const ParticleSource&) const = default;
 };
@@ -86,7 +87,7 @@ enum class LightType { Point, Spot, Directional };
 struct LightSource {
   std::string name;  ///< unique; letters, digits, '_' (it becomes a channel name)
   LightType type = LightType::Point;
-  vec3 position{0};          ///< point, spot
+  dvec3 position{0};         ///< point, spot
   vec3 direction{0, -1, 0};  ///< directional, spot (from position to target): of travel; unit length after parsing
   float innerAngle = 20;     ///< spot: half angle up to which it is at full strength [degrees], 0 ≤ inner ≤ outer
   float outerAngle = 30;     ///< spot: half angle beyond which there is nothing [degrees], 0 < outer < 180
@@ -127,8 +128,9 @@ struct Solid {
   SolidMode mode = SolidMode::Shaded;  ///< in the picture: Lambert; cut out of the medium; not at all
   vec3 albedo{0.5f};                   ///< 0–1
   bool castsShadows = true, receivesShadows = true;
-  vec3 translate{0}, rotate{0};  ///< as a particle source's
-  float scale = 1;               ///< > 0
+  dvec3 translate{0};  ///< as a particle source's
+  vec3 rotate{0};
+  float scale = 1;  ///< > 0
 
   bool operator==(const Solid&) const = default;
 };
@@ -138,7 +140,8 @@ enum class Projection { Perspective, Orthographic };
 /// What the camera is at one frame; between keys it moves smoothly (camera_path.h).
 struct CameraKey {
   float frame = 1;  ///< may be fractional
-  std::optional<vec3> position = std::nullopt, target = std::nullopt, up = std::nullopt;
+  std::optional<dvec3> position = std::nullopt, target = std::nullopt;
+  std::optional<vec3> up = std::nullopt;
   std::optional<float> fov = std::nullopt, height = std::nullopt, focusDistance = std::nullopt;
 
   bool operator==(const CameraKey&) const = default;
@@ -149,7 +152,8 @@ struct Camera {
   bool fitted = false;        ///< true: no position and no target, in no key either; fitDefaults() places it by the box
   bool fittedDepths = false;  ///< true: fitted, and neither near nor far given; fitDefaults() sets both
   bool fittedHeight = false;  ///< true: fitted, orthographic, and no height given; fitDefaults() sets it
-  vec3 position{0, 1, 4}, target{0, 0.5f, 0}, up{0, 1, 0};
+  dvec3 position{0, 1, 4}, target{0, 0.5, 0};
+  vec3 up{0, 1, 0};
   float fov = 40;                      ///< perspective: vertical, 0 < fov < 180
   float height = 2;                    ///< orthographic: of the picture [scene units], > 0
   float near = 0.01f, far = 1000;      ///< depths; particles whose centre lies outside are not drawn
@@ -210,6 +214,9 @@ struct Scene {
   View view;
   Output output;
   Frames frames;
+  /// What float32 coordinates are measured from; none: what loadParticles finds best.
+  std::optional<dvec3> origin;
+  dvec3 movedBy{0};  ///< what has been taken off the places of camera and lights (moveOrigin)
   InputRules inputs;
 
   bool operator==(const Scene&) const = default;

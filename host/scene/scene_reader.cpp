@@ -24,6 +24,17 @@ void readFormatVersion(ObjectReader& root) {
                  fmt::format("this is Mote {}", MOTE_VERSION));
 }
 
+void readOrigin(ObjectReader& root, std::optional<dvec3>& origin) {
+  const JsonNode* node = root.find("origin");
+  if (!node || (node->kind == JsonNode::Kind::String && node->text == "auto")) return;
+  dvec3 point(0);
+  if (node->kind != JsonNode::Kind::Array) {
+    root.problem("origin", R"([x, y, z] or "auto")", node->shown());
+  } else if (root.vector("origin", point, kCoordinate)) {
+    origin = point;
+  }
+}
+
 Scene readWhole(ObjectReader& root, const std::string& path) {
   Scene scene;
   scene.path = path;
@@ -38,6 +49,7 @@ Scene readWhole(ObjectReader& root, const std::string& path) {
   readView(root, folder, scene.view);
   readOutput(root, folder, scene.output);
   readFrames(root, scene.frames);
+  readOrigin(root, scene.origin);
   root.finish();
   return scene;
 }

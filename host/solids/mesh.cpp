@@ -33,7 +33,7 @@ dmat4 fromAssimp(const aiMatrix4x4& m) {  // Assimp's are rows, glm's columns
 
 /// As for particle sources: scale, rotate about x, then y, then z, translate.
 dmat4 sceneTransform(const Solid& solid) {
-  dmat4 transform = glm::translate(dmat4(1), dvec3(solid.translate));
+  dmat4 transform = glm::translate(dmat4(1), solid.translate);
   for (const int axis : {2, 1, 0}) {  // Rz · Ry · Rx: x is applied first
     dvec3 about(0);
     about[axis] = 1;

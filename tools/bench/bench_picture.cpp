@@ -15,7 +15,7 @@ Scene benchScene(const nlohmann::json& source, ivec2 size) {
   Scene scene = parseScene(text.dump(), "bench.json");
   const layout::Light light = benchLight();
   scene.defaultLights = false;
-  scene.lights = {{.name = "key", .position = light.position, .strength = light.power.x, .decay = light.decay}};
+  scene.lights = {{.name = "key", .position = dvec3(light.position), .strength = light.power.x, .decay = light.decay}};
   scene.output.size = size;
   return scene;
 }

@@ -34,6 +34,9 @@ Metadata Metadata::int32(std::string channel, std::string name, std::int32_t val
 Metadata Metadata::float64(std::string channel, std::string name, double value) {
   return numbers(std::move(channel), std::move(name), NumberType::F64, &value, 1);
 }
+Metadata Metadata::float64s(std::string channel, std::string name, const std::vector<double>& values) {
+  return numbers(std::move(channel), std::move(name), NumberType::F64, values.data(), values.size());
+}
 Metadata Metadata::float32s(std::string channel, std::string name, const std::vector<float>& values) {
   return numbers(std::move(channel), std::move(name), NumberType::F32, values.data(), values.size());
 }

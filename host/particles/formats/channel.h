@@ -34,6 +34,7 @@ struct Metadata {
   static Metadata text(std::string channel, std::string name, std::string text);
   static Metadata int32(std::string channel, std::string name, std::int32_t value);
   static Metadata float64(std::string channel, std::string name, double value);
+  static Metadata float64s(std::string channel, std::string name, const std::vector<double>& values);
   static Metadata float32s(std::string channel, std::string name, const std::vector<float>& values);
 };
 
