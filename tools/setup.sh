@@ -10,7 +10,7 @@ packages=(
   libvulkan1 libvulkan-dev libvulkan-volk-dev mesa-vulkan-drivers vulkan-validationlayers
   glslang-tools spirv-tools
   libglm-dev libtbb-dev libopenexr-dev libpng-dev libssl-dev
-  zlib1g-dev liblz4-dev libzip-dev libblosc-dev libpugixml-dev libhdf5-dev
+  zlib1g-dev liblz4-dev libzip-dev libblosc-dev libpugixml-dev libnanoflann-dev libhdf5-dev
   libassimp-dev libembree-dev libcli11-dev nlohmann-json3-dev libfmt-dev libhwy-dev libgtest-dev
   imagemagick fonts-dejavu-core python3 python3-numpy
 )
