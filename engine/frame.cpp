@@ -11,6 +11,7 @@
 #include "host/lighting/auto_subsample.h"
 #include "host/lighting/medium.h"
 #include "host/scene/fitting.h"
+#include "host/scene/frame_path.h"
 #include "host/scene/origin.h"
 #include "host/solids/mesh.h"
 
@@ -134,7 +135,7 @@ void settleDensity(Scene& scene, Frame& frame, FrameStats& stats) {
 bool isAnimated(const Scene& scene) {
   if (scene.frames.first != scene.frames.last) return true;
   return std::any_of(scene.particles.begin(), scene.particles.end(),
-                     [](const ParticleSource& source) { return source.file.find('#') != std::string::npos; });
+                     [](const ParticleSource& source) { return hasFramePattern(source.file); });
 }
 
 void prepareMedium(const Scene& scene, Frame& frame) {

@@ -9,6 +9,7 @@
 #include "host/core/timer.h"
 #include "host/particles/particle_loader.h"
 #include "host/scene/frame_path.h"
+#include "host/scene/sequence.h"
 
 namespace mote {
 namespace {
@@ -32,8 +33,9 @@ FrameFiles loadFrame(const Scene& scene, int number, FramePurpose purpose) {
   for (const Solid& solid : scene.solids) {
     Solid placed = solid;
     placed.translate -= files.particles.origin;
-    files.meshes.push_back(loadMesh(placed, number));
-    paths.push_back(framePath(solid.file, number));
+    const int held = fileFrame(solid.file, number, scene.inputs.missing);
+    files.meshes.push_back(loadMesh(placed, held));
+    paths.push_back(framePath(solid.file, held));
   }
   if (purpose == FramePurpose::Picture) files.sprites = readSprites(scene, paths);
   files.inputs = hashInputs(paths);

@@ -26,6 +26,22 @@ TEST(FramePath, PadsTheFrameNumberToTheRunOfHashes) {
   EXPECT_THROW(framePath("a.##.##.exr", 1), InputError);
 }
 
+TEST(FramePath, TakesPercentDAsOtherProgramsWriteIt) {
+  EXPECT_EQ(framePath("a.%04d.exr", 12), "a.0012.exr");
+  EXPECT_EQ(framePath("a.%04d.exr", -7), "a.-007.exr");
+  EXPECT_EQ(framePath("a.%d.exr", 12), "a.12.exr");
+  EXPECT_EQ(framePath("a%012d", 7), "a000000000007");
+  EXPECT_EQ(framePath("%04d/a.%d", 3), "%04d/a.3");
+  EXPECT_TRUE(hasFramePattern("x/a.%03d.exr"));
+  // None of these is one.
+  for (const char* name : {"a.%4d.exr", "50%", "a%0d", "a.%0123d.exr", "a.%s.exr", "a%-04d", "%00d"}) {
+    EXPECT_FALSE(hasFramePattern(name)) << name;
+    EXPECT_EQ(framePath(name, 3), name);
+  }
+  for (const char* name : {"a.%04d.%04d.exr", "a.##.%d.exr", "a.%d#.exr"})
+    EXPECT_THROW(framePath(name, 1), InputError) << name;
+}
+
 TEST(FrameRange, ReadsASingleFrameARangeAndAStep) {
   const auto is = [](const char* text, int first, int last, int step) {
     const FrameRange range = parseFrameRange(text);

@@ -11,6 +11,7 @@
 #include "host/core/timer.h"
 #include "host/image/png.h"
 #include "host/scene/frame_path.h"
+#include "host/scene/sequence.h"
 
 namespace mote {
 namespace {
@@ -90,6 +91,7 @@ void render(const RenderOptions& options, const CommonOptions& common) {
   applyFlags(options, scene);
   parseExposure(options.exposure);
   checkOutputs(options, scene);
+  checkSequences(scene);
 
   std::unique_ptr<Gpu> gpu;
   const Backends backends = chooseBackends(scene.lighting.backend, scene.view.backend, deviceOptions(common), gpu);

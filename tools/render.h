@@ -17,10 +17,11 @@ namespace mote {
 struct SceneOptions {
   std::string scene;
   std::vector<std::string> overrides;  ///< --set
+  std::string missing = "error";
   bool strict = false;
 };
 
-/// Adds SCENE, --set and --strict.
+/// Adds SCENE, --set, --strict and --missing.
 void addSceneOptions(CLI::App& command, SceneOptions& options);
 /// Reads the scene and changes it as the options say. Throws InputError as readScene does.
 Scene openScene(const SceneOptions& options);

@@ -20,11 +20,18 @@ void addSceneOptions(CLI::App& command, SceneOptions& options) {
       ->take_all();
   command.add_flag("--strict", options.strict,
                    "Refuse particles that are not finite or of no size, instead of leaving them out with a warning");
+  command
+      .add_option("--missing", options.missing,
+                  "What frames without a particle file or a mesh are: error, or hold, which takes the one before")
+      ->type_name("error|hold");
 }
 
 Scene openScene(const SceneOptions& options) {
   Scene scene = readScene(options.scene, options.overrides);
   scene.inputs.strict = options.strict;
+  if (options.missing != "error" && options.missing != "hold")
+    throw InputError("--missing", "", "error or hold", "\"" + options.missing + "\"");
+  if (options.missing == "hold") scene.inputs.missing = MissingFrames::Hold;
   return scene;
 }
 

@@ -14,6 +14,7 @@
 #include "host/particles/source_reader.h"
 #include "host/scene/frame_path.h"
 #include "host/scene/origin.h"
+#include "host/scene/sequence.h"
 
 namespace mote {
 namespace {
@@ -120,7 +121,8 @@ ParticleSet loadParticles(const std::vector<ParticleSource>& sources, int frame,
   std::vector<LoadedSource> parts;
   std::vector<Placement> places;
   for (const ParticleSource& source : sources) {
-    const std::string path = source.file.empty() ? "" : framePath(source.file, frame);
+    const std::string path =
+        source.file.empty() ? "" : framePath(source.file, fileFrame(source.file, frame, rules.missing));
     if (openedFiles && !path.empty()) openedFiles->push_back(path);
     LoadedSource loaded =
         path.empty() ? generateSource(source, frame) : readSource(source, path, rules.framesPerSecond);

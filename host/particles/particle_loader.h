@@ -14,6 +14,7 @@ struct LoadRules {
   DensityMode densityMode = DensityMode::CrossSection;
   double framesPerSecond = 24;  ///< of velocities per frame
   bool strict = false;          ///< what is no particle is refused, not left out
+  MissingFrames missing = MissingFrames::Error;
   std::optional<dvec3> origin;  ///< what positions are measured from; none: what is best
 
   LoadRules() = default;
@@ -22,10 +23,12 @@ struct LoadRules {
       : densityMode(scene.medium.densityMode),
         framesPerSecond(scene.frames.fps),
         strict(scene.inputs.strict),
+        missing(scene.inputs.missing),
         origin(scene.origin) {}
 };
 
-/// Loads every source for `frame` ('####' in a file name is the frame, see framePath) and merges them in order.
+/// Loads every source for `frame` ('####' in a file name is the frame, see framePath; what is done where there is none,
+/// fileFrame) and merges them in order.
 ///
 /// Our channels and what they are called in a file unless `ParticleSource::channels` says otherwise: Position (needed),
 /// Radius, Density, Color, Absorption, Emission, Velocity, ID. Colours may be grey (arity 1). Without Density or Color

@@ -31,21 +31,54 @@ bool take(std::string_view& text, char c) {
 
 std::size_t nameBegin(std::string_view path) { return path.rfind('/') + 1; }  // npos + 1 is 0: the whole path
 
+/// Where the frame number stands, and how many digits it has at least.
+struct FramePattern {
+  std::size_t begin, end;
+  std::size_t width;
+};
+
+/// "%d" or "%0Nd" at `at`.
+std::optional<FramePattern> percentPattern(std::string_view text, std::size_t at) {
+  std::size_t end = at + 1, width = 0;
+  if (end < text.size() && text[end] == '0')
+    // Two digits: no name is longer than 99.
+    for (++end; end < text.size() && end <= at + 3 && text[end] >= '0' && text[end] <= '9'; ++end)
+      width = 10 * width + static_cast<std::size_t>(text[end] - '0');
+  if (end >= text.size() || text[end] != 'd' || (end > at + 1 && width == 0)) return std::nullopt;
+  return FramePattern{at, end + 1, width};
+}
+
+/// The first at or after `from`.
+std::optional<FramePattern> findPattern(std::string_view text, std::size_t from) {
+  for (std::size_t at = from; (at = text.find_first_of("#%", at)) != std::string_view::npos; ++at) {
+    if (text[at] == '#') {
+      const std::size_t end = std::min(text.find_first_not_of('#', at), text.size());
+      return FramePattern{at, end, end - at};
+    }
+    if (const auto found = percentPattern(text, at)) return found;
+  }
+  return std::nullopt;
+}
+
 std::string quoted(std::string_view text) { return fmt::format("\"{}\"", text); }
 
 }  // namespace
 
-bool hasFramePattern(std::string_view pattern) {
-  return pattern.find('#', nameBegin(pattern)) != std::string_view::npos;
-}
+bool hasFramePattern(std::string_view pattern) { return findPattern(pattern, nameBegin(pattern)).has_value(); }
 
 std::string framePath(std::string_view pattern, int frame) {
-  const std::size_t begin = pattern.find('#', nameBegin(pattern));
-  if (begin == std::string_view::npos) return std::string(pattern);
-  const std::size_t end = std::min(pattern.find_first_not_of('#', begin), pattern.size());
-  if (pattern.find('#', end) != std::string_view::npos)
-    throw InputError(pattern, "", "one run of # for the frame number", "several", "write it as name.####.prt");
-  return fmt::format("{}{:0{}}{}", pattern.substr(0, begin), frame, end - begin, pattern.substr(end));
+  const auto found = findPattern(pattern, nameBegin(pattern));
+  if (!found) return std::string(pattern);
+  if (findPattern(pattern, found->end))
+    throw InputError(pattern, "", "one run of # (or one %04d) for the frame number", "several",
+                     "write it as name.####.prt");
+  return fmt::format("{}{:0{}}{}", pattern.substr(0, found->begin), frame, found->width, pattern.substr(found->end));
+}
+
+FramePatternParts framePatternParts(std::string_view pattern) {
+  const auto found = findPattern(pattern, nameBegin(pattern));
+  if (!found) return {std::string(pattern), ""};
+  return {std::string(pattern.substr(0, found->begin)), std::string(pattern.substr(found->end))};
 }
 
 FrameRange parseFrameRange(std::string_view text) {

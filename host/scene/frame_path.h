@@ -10,13 +10,20 @@ namespace mote {
 /// Frame numbers lie in ±this, so that loops over frames cannot overflow an int.
 constexpr int kMaxFrame = 9'999'999;
 
-/// True if the file name (what follows the last '/') of `pattern` has a '#'. Folders may be named with one.
+/// True if the file name (what follows the last '/') of `pattern` has a '#', a "%d" or a "%04d" (%0 and a width up to
+/// 99). Folders may be named with one.
 bool hasFramePattern(std::string_view pattern);
 
-/// Replaces the run of '#' in the file name by the frame number, zero-padded to at least the run's length; the sign of
-/// a negative frame stands before the zeros and counts as one place ("a.####.exr", -7 → "a.-007.exr", as printf's
-/// %04d). A pattern without '#' comes back unchanged. Throws InputError when the file name has more than one run.
+/// Replaces it (all of a run of '#') by the frame number, zero-padded to at least the run's length or the width; the
+/// sign of a negative frame stands before the zeros and counts as one place ("a.####.exr", -7 → "a.-007.exr", as
+/// printf's %04d). A pattern without one comes back unchanged. Throws InputError when the file name has more than one.
 std::string framePath(std::string_view pattern, int frame);
+
+/// What stands before the frame number, folder included, and after it; all of it before, where there is none.
+struct FramePatternParts {
+  std::string head, tail;
+};
+FramePatternParts framePatternParts(std::string_view pattern);
 
 /// Frames first, first + step, … up to last; last ≥ first, step ≥ 1; all within ±kMaxFrame.
 struct FrameRange {

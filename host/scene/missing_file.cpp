@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 #include <numeric>
 #include <vector>
 
 #include "host/scene/frame_path.h"
+#include "host/scene/sequence.h"
 
 namespace mote {
 namespace {
@@ -42,23 +42,6 @@ std::vector<std::string> fileNames(const fs::path& folder) {
   return names;
 }
 
-/// Frames of "head####tail" among the names.
-std::vector<int> existingFrames(const std::string& patternName, const std::vector<std::string>& names) {
-  const std::size_t first = patternName.find('#'), last = patternName.find_last_of('#');
-  if (first == std::string::npos) return {};
-  const std::string head = patternName.substr(0, first), tail = patternName.substr(last + 1);
-  std::vector<int> frames;
-  for (const std::string& name : names) {
-    if (name.size() <= head.size() + tail.size() || !name.starts_with(head) || !name.ends_with(tail)) continue;
-    const char *begin = name.data() + head.size(), *end = name.data() + name.size() - tail.size();
-    int frame = 0;
-    const auto [stop, error] = std::from_chars(begin, end, frame);
-    if (error == std::errc{} && stop == end) frames.push_back(frame);
-  }
-  std::sort(frames.begin(), frames.end());
-  return frames;
-}
-
 }  // namespace
 
 std::string nearestNames(const std::string& pattern, const std::string& path) {
@@ -69,7 +52,7 @@ std::string nearestNames(const std::string& pattern, const std::string& path) {
   std::vector<std::string> names = fileNames(folder);
   if (names.empty()) return fmt::format("the folder '{}' is empty", folder.string());
   if (hasFramePattern(pattern)) {
-    const std::vector<int> frames = existingFrames(fs::path(pattern).filename().string(), names);
+    const std::vector<int> frames = existingFrames(pattern);
     if (frames.size() == 1) return fmt::format("of this sequence only frame {} exists", frames[0]);
     if (!frames.empty())
       return fmt::format("of this sequence {} frames from {} to {} exist", frames.size(), frames.front(),

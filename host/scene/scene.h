@@ -39,7 +39,7 @@ enum class VelocityTime { Second, Frame };
 
 struct ParticleSource {
   std::string pointer;  ///< where it stands in the scene, "/particles/0": the place of messages
-  std::string file;     ///< path as opened (relative paths resolved), may hold ####; empty if generated
+  std::string file;     ///< path as opened (relative paths resolved), may hold #### or %04d; empty if generated
   Generator generate = Generator::None;
   std::uint64_t count = 0;  ///< generated particles, 1 … 4e9
   std::uint64_t seed = 0;
@@ -48,8 +48,8 @@ struct ParticleSource {
   std::optional<UpAxis> up;                         ///< of the file; none: y
   std::optional<LengthUnit> unit;                   ///< of the file; none: as long as the scene's
   VelocityTime velocityPer = VelocityTime::Second;  ///< what the file's velocities are per
-  float density = 1;                                ///< used where the file has no Density
-  vec3 color{1};                                    ///< used where the file has no Color
+  float density = 1;  ///< used where the file has no Density
+  vec3 color{1};      ///< used where the file has no Color
   dvec3 translate{0};
   vec3 rotate{0};   ///< degrees about x, then y, then z; order: scale, rotate, translate
   float scale = 1;  ///< > 0; radii and velocities scale with it, cross-sections with its square
@@ -195,9 +195,13 @@ struct Frames {
   bool operator==(const Frames&) const = default;
 };
 
+/// A frame without a file: an error, or the nearest earlier file stands for it.
+enum class MissingFrames { Error, Hold };
+
 /// What is done with files that are not as they should be: from flags, no part of a scene's text.
 struct InputRules {
   bool strict = false;  ///< particles that are not finite or of no size are refused; else left out with a warning
+  MissingFrames missing = MissingFrames::Error;
 
   bool operator==(const InputRules&) const = default;
 };

@@ -31,7 +31,8 @@ bool readPath(ObjectReader& object, std::string_view key, std::string& path, con
   try {
     framePath(path, 1);
   } catch (const InputError&) {
-    object.problem(key, "at most one run of # for the frame number", quotedForMessage(given), "as in plume.####.prt");
+    object.problem(key, "at most one run of # (or one %04d) for the frame number", quotedForMessage(given),
+                   "as in plume.####.prt");
   }
   return true;
 }
