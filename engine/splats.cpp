@@ -84,6 +84,15 @@ std::vector<vec3> inSetOrder(const Frame& frame, const SplatSet& set, const Get&
   return result;
 }
 
+/// Where a particle is drawn, and how it moves while the shutter is open.
+struct Drawn {
+  vec3 position, velocity;
+};
+Drawn drawn(const ParticleSet& particles, const vec3& position, std::size_t i) {
+  if (!particles.shutterVelocity.empty()) return {position + particles.shutterShift[i], particles.shutterVelocity[i]};
+  return {position, particles.velocity.empty() ? vec3(0) : particles.velocity[i]};
+}
+
 /// The receivers that can be seen, ascending; empty, with `all` set, where it is all of them.
 std::vector<std::uint32_t> seenReceivers(const Frame& frame, const View& view, const layout::SplatScene& scene,
                                          bool& all) {
@@ -95,9 +104,9 @@ std::vector<std::uint32_t> seenReceivers(const Frame& frame, const View& view, c
     std::vector<std::uint32_t>& seen = parts[begin / kBlock];
     for (std::size_t k = begin; k < end; ++k) {
       layout::SplatParticle particle{};
-      particle.position = receivers.position(k), particle.radius = particles.radius[source[k]] * view.radiusScale;
-      const vec3 velocity = particles.velocity.empty() ? vec3(0) : particles.velocity[source[k]];
-      if (maybeSeen(particle, velocity, scene)) seen.push_back(static_cast<std::uint32_t>(k));
+      const Drawn at = drawn(particles, receivers.position(k), source[k]);
+      particle.position = at.position, particle.radius = particles.radius[source[k]] * view.radiusScale;
+      if (maybeSeen(particle, at.velocity, scene)) seen.push_back(static_cast<std::uint32_t>(k));
     }
   });
   std::size_t count = 0;
@@ -163,7 +172,7 @@ SplatSet splatSet(const Frame& frame, const Scene& scene, const std::vector<vec3
   parallelBlocks(set.particles.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const std::size_t receiver = set.receiverOf(k), i = source[receiver];
-      set.particles[k] = {.position = receivers.position(receiver),
+      set.particles[k] = {.position = drawn(particles, receivers.position(receiver), i).position,
                           .radius = particles.radius[i] * scene.view.radiusScale,
                           .radiance = albedoOf(particles, scene.medium, i) * inScattered[receiver],
                           .peak = std::min(frame.peak[i] * peakScale, std::numeric_limits<float>::max())};
@@ -174,7 +183,7 @@ SplatSet splatSet(const Frame& frame, const Scene& scene, const std::vector<vec3
   if (!particles.emission.empty() && emissionScale > 0)
     set.emission = inSetOrder(frame, set, [&](std::size_t i) { return particles.emission[i] * emissionScale; });
   if (!particles.velocity.empty() && (open || scene.output.velocity))
-    set.velocity = inSetOrder(frame, set, [&](std::size_t i) { return particles.velocity[i]; });
+    set.velocity = inSetOrder(frame, set, [&](std::size_t i) { return drawn(particles, vec3(0), i).velocity; });
   return set;
 }
 

@@ -143,7 +143,7 @@ TEST(CameraPath, StaysOnACircleOfTwelveKeys) {
     const double off = std::abs(std::hypot(p.x, p.z) / 5 - 1);
     double& most = frame < 11 || frame > 101 ? worstAtEnds : worst;
     most = std::max(most, off);
-    EXPECT_EQ(cameraAt(camera, frame).position.y, 1);
+    EXPECT_FLOAT_EQ(static_cast<float>(cameraAt(camera, frame).position.y), 1);
   }
   // Keys h = 2π/11 apart. The middle of an inner segment lies at cos(h/2) + (sin h / 4) sin(h/2) = 0.99757 of the
   // radius. The end segments are the parabola through three keys: across the circle its error is h⁴/32 = 0.0033 to

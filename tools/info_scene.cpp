@@ -90,6 +90,7 @@ struct MemoryFacts {
   double cellNodes;  ///< bytes of nodes a particle in the tree
   bool color, absorption, emission, velocity, id;
   bool moving;       ///< velocities are drawn
+  bool curved;       ///< paths in the shutter beside them
   bool rgb, solids;  ///< extinction that is not grey; solids that are seen
   bool ahead;        ///< the next frame's particles load meanwhile
 
@@ -109,6 +110,9 @@ struct MemoryFacts {
     color = any(&SourceFacts::color), absorption = any(&SourceFacts::absorption);
     emission = any(&SourceFacts::emission), velocity = any(&SourceFacts::velocity), id = any(&SourceFacts::id);
     moving = velocity && (scene.output.velocity || scene.camera.shutter.x != scene.camera.shutter.y);
+    curved = scene.camera.shutter.x != scene.camera.shutter.y &&
+             std::any_of(scene.particles.begin(), scene.particles.end(),
+                         [](const ParticleSource& source) { return source.interpolate == Interpolation::Hermite; });
     const vec3& e = scene.medium.extinction;
     rgb = absorption || e.x != e.y || e.y != e.z;
     ahead = scene.frames.first + scene.frames.step <= scene.frames.last && threadCount() > 1;
@@ -123,7 +127,8 @@ struct MemoryFacts {
 
 /// Bytes a particle on the host while the picture is drawn, which is when most is held.
 double particleBytes(const MemoryFacts& f, const Output& output) {
-  const double loaded = 12 + 4 + 4 + 12.0 * (f.color + f.absorption + f.emission + f.velocity) + 8.0 * f.id;
+  const double loaded =
+      12 + 4 + 4 + 12.0 * (f.color + f.absorption + f.emission + f.velocity) + 8.0 * f.id + 24.0 * f.curved;
   const double set = loaded * (f.ahead ? 2 : 1) + 4;  // and the optical depth through each
   const double tree = f.share * (6 * 4 + 8 * f.absorption + f.cellNodes) + (f.sampled() ? 5 * 4 : 0);
   const double sort = 8 + 4;                                                                 // (key, index) and order

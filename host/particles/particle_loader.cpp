@@ -12,6 +12,7 @@
 #include "host/particles/particle_checks.h"
 #include "host/particles/placement.h"
 #include "host/particles/source_reader.h"
+#include "host/particles/sub_frames.h"
 #include "host/scene/frame_path.h"
 #include "host/scene/origin.h"
 #include "host/scene/sequence.h"
@@ -43,6 +44,7 @@ void alignChannels(const std::vector<ParticleSource>& sources, std::vector<Loade
   const bool velocity = any([](const LoadedSource& p) { return !p.set.velocity.empty(); });
   // Where particles were left out the index no longer says which is which from frame to frame: that in the file does.
   const bool id = any([](const LoadedSource& p) { return !p.set.id.empty() || !p.index.empty(); });
+  const bool curved = any([](const LoadedSource& p) { return !p.set.shutterVelocity.empty(); });
   const bool absorption = any([](const LoadedSource& p) { return !p.set.absorption.empty(); });
   const bool emission = any([](const LoadedSource& p) { return !p.set.emission.empty(); });
   uniformColor = sources[0].color;
@@ -55,6 +57,10 @@ void alignChannels(const std::vector<ParticleSource>& sources, std::vector<Loade
     if (absorption && set.absorption.empty()) set.absorption = restOfColor(set, sources[k].color);
     if (emission && set.emission.empty()) set.emission.assign(set.size(), vec3(0));
     if (velocity && set.velocity.empty()) set.velocity.assign(set.size(), vec3(0));
+    if (curved && set.shutterVelocity.empty()) {
+      set.shutterVelocity = set.velocity;
+      set.shutterShift.assign(set.size(), vec3(0));
+    }
     if (id && set.id.empty()) {
       set.id.resize(set.size());
       const std::vector<std::uint64_t>& index = parts[k].index;
@@ -78,6 +84,8 @@ ParticleSet merged(const std::vector<ParticleSource>& sources, std::vector<Loade
     append(all.emission, set.emission);
     append(all.velocity, set.velocity);
     append(all.id, set.id);
+    append(all.shutterVelocity, set.shutterVelocity);
+    append(all.shutterShift, set.shutterShift);
   }
   all.uniformColor = uniformColor;
   return all;
@@ -120,9 +128,10 @@ ParticleSet loadParticles(const std::vector<ParticleSource>& sources, int frame,
   if (sources.empty()) throw InputError("particles", "", "at least one source", "none");
   std::vector<LoadedSource> parts;
   std::vector<Placement> places;
+  std::vector<int> frames;  // of the files, which may be held
   for (const ParticleSource& source : sources) {
-    const std::string path =
-        source.file.empty() ? "" : framePath(source.file, fileFrame(source.file, frame, rules.missing));
+    frames.push_back(source.file.empty() ? frame : fileFrame(source.file, frame, rules.missing));
+    const std::string path = source.file.empty() ? "" : framePath(source.file, frames.back());
     if (openedFiles && !path.empty()) openedFiles->push_back(path);
     LoadedSource loaded =
         path.empty() ? generateSource(source, frame) : readSource(source, path, rules.framesPerSecond);
@@ -136,6 +145,8 @@ ParticleSet loadParticles(const std::vector<ParticleSource>& sources, int frame,
   for (std::size_t k = 0; k < parts.size(); ++k) {
     moveIntoScene(places[k], origin, parts[k]);
     checkParticles(parts[k], rules.strict, " in the scene");  // what was finite in the file may not be after scaling
+    if (sources[k].interpolate == Interpolation::Hermite && rules.shutter.x != rules.shutter.y)
+      interpolateShutter(sources[k], rules, frames[k], parts[k], openedFiles);
     if (parts[k].set.size() == 0) empty += fmt::format("{}{}", empty.empty() ? "" : ", ", parts[k].place);
   }
   ParticleSet all = merged(sources, parts);

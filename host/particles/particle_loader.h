@@ -13,6 +13,7 @@ namespace mote {
 struct LoadRules {
   DensityMode densityMode = DensityMode::CrossSection;
   double framesPerSecond = 24;  ///< of velocities per frame
+  vec2 shutter{0};              ///< opens and closes, relative to the frame [s]: what "hermite" interpolates for
   bool strict = false;          ///< what is no particle is refused, not left out
   MissingFrames missing = MissingFrames::Error;
   std::optional<dvec3> origin;  ///< what positions are measured from; none: what is best
@@ -22,6 +23,7 @@ struct LoadRules {
   explicit LoadRules(const Scene& scene)
       : densityMode(scene.medium.densityMode),
         framesPerSecond(scene.frames.fps),
+        shutter(scene.camera.shutter),
         strict(scene.inputs.strict),
         missing(scene.inputs.missing),
         origin(scene.origin) {}
@@ -42,6 +44,9 @@ struct LoadRules {
 /// in the sources, one after the other. Where only some have Absorption, the rest get what Color leaves of 1, max(0, 1
 /// − Color): their extinction is then Density where medium.albedo is 1, and smaller by Density · Color · (1 − albedo)
 /// elsewhere. Give them the channel where that matters.
+///
+/// A source with Interpolation::Hermite also reads the files beside the frame's where the shutter is open, for its
+/// particles' paths (sub_frames.h); the rest of the sources then have theirs along their velocities.
 ///
 /// Positions are measured from `origin`, the same for all sources. Unless the rules name it that is (0, 0, 0), except
 /// where float32's steps there are more than 1/1000 of the mean radius and the particles lie far enough off the scene's

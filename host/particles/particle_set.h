@@ -21,6 +21,9 @@ struct ParticleSet {
   std::vector<std::uint64_t> id;  ///< empty: no source has it
   std::vector<vec3> absorption;   ///< RGB, relative to `density`, finite, ≥ 0; empty: no source has it
   std::vector<vec3> emission;     ///< radiance, RGB [W/(m² sr)], finite, ≥ 0; empty: no source has it
+  /// While the shutter is open a particle moves evenly; t after the frame's time it is at position + shutterShift +
+  /// t · shutterVelocity, which is exact when the shutter opens and closes. Empty: at position + t · velocity.
+  std::vector<vec3> shutterVelocity, shutterShift;
   vec3 uniformColor{1};
   dvec3 origin{0};  ///< of scene space, what positions are measured from
 

@@ -66,6 +66,23 @@ std::optional<std::string> radiusChannel(const ParticleSource& source, const Par
   return wanted(source, file, "Radius", name) ? std::optional(name.theirs) : std::nullopt;
 }
 
+/// Requests all but where a particle is and goes.
+void addLooks(const ParticleSource& source, const ParticleFile& file, LoadedSource& loaded,
+              std::vector<ChannelRequest>& requests) {
+  ParticleSet& set = loaded.set;
+  if (const auto radius = radiusChannel(source, file)) requests.push_back({*radius, &set.radius});
+  if (const auto name = nameInFile(source, file, "Density"); wanted(source, file, "Density", name))
+    requests.push_back({name.theirs, &set.density});
+  if (const auto name = nameInFile(source, file, "Color"); wanted(source, file, "Color", name)) {
+    requests.push_back({name.theirs, &set.color});
+    loaded.hasColor = true;
+  }
+  if (const auto name = nameInFile(source, file, "Absorption"); wanted(source, file, "Absorption", name))
+    requests.push_back({name.theirs, &set.absorption});
+  if (const auto name = nameInFile(source, file, "Emission"); wanted(source, file, "Emission", name))
+    requests.push_back({name.theirs, &set.emission});
+}
+
 /// Whether a number may need more than float32 has.
 bool isWide(NumberType type) { return numberSize(type) >= 4 && type != NumberType::F32; }
 
@@ -95,7 +112,8 @@ void takePositions(const std::vector<dvec3>& from, LoadedSource& loaded) {
 
 }  // namespace
 
-LoadedSource readSource(const ParticleSource& source, const std::string& path, double framesPerSecond) {
+LoadedSource readSource(const ParticleSource& source, const std::string& path, double framesPerSecond,
+                        SourceChannels channels) {
   checkChannelKeys(source);
   const std::unique_ptr<ParticleFile> opened = openFile(source, path);
   const ParticleFile& file = *opened;
@@ -115,17 +133,7 @@ LoadedSource readSource(const ParticleSource& source, const std::string& path, d
   } else {
     requests.push_back({position.theirs, &set.position});
   }
-  if (const auto radius = radiusChannel(source, file)) requests.push_back({*radius, &set.radius});
-  if (const auto name = nameInFile(source, file, "Density"); wanted(source, file, "Density", name))
-    requests.push_back({name.theirs, &set.density});
-  if (const auto name = nameInFile(source, file, "Color"); wanted(source, file, "Color", name)) {
-    requests.push_back({name.theirs, &set.color});
-    loaded.hasColor = true;
-  }
-  if (const auto name = nameInFile(source, file, "Absorption"); wanted(source, file, "Absorption", name))
-    requests.push_back({name.theirs, &set.absorption});
-  if (const auto name = nameInFile(source, file, "Emission"); wanted(source, file, "Emission", name))
-    requests.push_back({name.theirs, &set.emission});
+  if (channels == SourceChannels::All) addLooks(source, file, loaded, requests);
   if (wanted(source, file, "Velocity", velocity)) {
     requireVector(file, velocity.theirs);
     requests.push_back({velocity.theirs, &set.velocity});
@@ -135,7 +143,7 @@ LoadedSource readSource(const ParticleSource& source, const std::string& path, d
   file.read(requests);
   if (exact) takePositions(wide, loaded);
   loaded.count = set.size();
-  if (set.density.empty()) set.density.assign(set.size(), source.density);
+  if (set.density.empty() && channels == SourceChannels::All) set.density.assign(set.size(), source.density);
   return loaded;
 }
 

@@ -46,6 +46,8 @@ void readMeaning(ObjectReader& source, ParticleSource& particles) {
   readUnit(source, particles.unit);
   source.choice<VelocityTime>("velocity_per", particles.velocityPer,
                               {{"second", VelocityTime::Second}, {"frame", VelocityTime::Frame}});
+  source.choice<Interpolation>("interpolate", particles.interpolate,
+                               {{"velocity", Interpolation::Velocity}, {"hermite", Interpolation::Hermite}});
 }
 
 void readChannels(ObjectReader& source, std::map<std::string, std::string>& channels) {
@@ -84,7 +86,7 @@ ParticleSource readParticleSource(ObjectReader& object, const std::filesystem::p
   }
   object.onlyWhere(!fromFile || generated, "count", R"("count" only beside "generate")");
   object.onlyWhere(!fromFile || generated, "seed", R"("seed" only beside "generate")");
-  for (const char* key : {"channels", "up", "unit", "velocity_per"})
+  for (const char* key : {"channels", "up", "unit", "velocity_per", "interpolate"})
     object.onlyWhere(!generated || fromFile, key, fmt::format("\"{}\" only beside \"file\"", key));
   object.finish();
   return source;

@@ -37,6 +37,10 @@ struct LengthUnit {
 
 enum class VelocityTime { Second, Frame };
 
+/// Where a particle is while the shutter is open: on along its velocity, or on the curve to where it is in the frames
+/// before and after.
+enum class Interpolation { Velocity, Hermite };
+
 struct ParticleSource {
   std::string pointer;  ///< where it stands in the scene, "/particles/0": the place of messages
   std::string file;     ///< path as opened (relative paths resolved), may hold #### or %04d; empty if generated
@@ -48,6 +52,7 @@ struct ParticleSource {
   std::optional<UpAxis> up;                         ///< of the file; none: y
   std::optional<LengthUnit> unit;                   ///< of the file; none: as long as the scene's
   VelocityTime velocityPer = VelocityTime::Second;  ///< what the file's velocities are per
+  Interpolation interpolate = Interpolation::Velocity;
   float density = 1;  ///< used where the file has no Density
   vec3 color{1};      ///< used where the file has no Color
   dvec3 translate{0};
