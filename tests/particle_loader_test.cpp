@@ -108,6 +108,25 @@ TEST(ParticleLoader, FindsChannelsUnderTheNamesOfOtherPrograms) {
   EXPECT_EQ(loadParticles({fileSource(folder.file("b.prt"))}, 1).density, sample.density);
 }
 
+TEST(ParticleLoader, FindsTheNamesOfSimulationsAndOfMaya) {
+  const TempFolder folder;
+  const Sample sample;
+  for (const char* radius : {"SmoothingLength", "SmoothingLengths", "Hsml", "radiusPP"})
+    for (const char* velocity : {"Velocities", "velocities", "velocityPP"})
+      for (const char* id : {"ParticleIDs", "particleId", "particle_id", "Ids"}) {
+        const PrtColumn columns[] = {PrtColumn::of("Position", sample.position), PrtColumn::of(radius, sample.radius),
+                                     PrtColumn::of("masses", sample.density),    PrtColumn::of("Cs", sample.color),
+                                     PrtColumn::of(velocity, sample.velocity),   PrtColumn::of(id, sample.id)};
+        writePrt(folder.file("a.prt"), columns);
+        const ParticleSet set = loadParticles({fileSource(folder.file("a.prt"))}, 1);
+        EXPECT_EQ(set.radius, sample.radius) << radius;
+        EXPECT_EQ(set.density, sample.density);
+        EXPECT_EQ(set.color, sample.color);
+        EXPECT_EQ(set.velocity, sample.velocity) << velocity;
+        EXPECT_EQ(set.id, sample.id) << id;
+      }
+}
+
 TEST(ParticleLoader, MapsChannelsByTheNamesOfTheScene) {
   const TempFolder folder;
   const Sample sample;

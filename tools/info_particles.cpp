@@ -12,6 +12,7 @@
 #include "host/particles/formats/number_visit.h"
 #include "host/particles/formats/particle_file.h"
 #include "host/particles/spacing.h"
+#include "host/particles/wide_positions.h"
 #include "tools/info.h"
 
 namespace mote {
@@ -150,8 +151,15 @@ const Json* channelNamed(const Json& channels, const char* name) {
 /// "radius": "auto" of the scene: 1.5 × the mean distance to the nearest 8, of the particles that have a place.
 Json autoRadius(const ParticleFile& file) {
   std::vector<vec3> positions;
-  const ChannelRequest request{"Position", &positions};
-  file.read({&request, 1});
+  if (isWide(file.channel("Position")->type)) {  // distances far from 0 as well
+    std::vector<dvec3> wide;
+    const ChannelRequest request{"Position", &wide};
+    file.read({&request, 1});
+    toFloats(wide, positions);
+  } else {
+    const ChannelRequest request{"Position", &positions};
+    file.read({&request, 1});
+  }
   std::erase_if(positions,
                 [](const vec3& p) { return !(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)); });
   const double radius = kAutoRadiusFactor * meanNeighbourDistance(positions);

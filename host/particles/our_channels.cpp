@@ -13,13 +13,13 @@ struct OurChannel {
 };
 constexpr OurChannel kChannels[] = {
     {"Position", {"P", "position", "pos", "Coordinates", "coordinates", "points"}},
-    {"Radius", {"pscale", "radius", "radiusPP", "SmoothingLength", "SmoothingLengths"}},
-    {"Density", {"density", "Mass", "mass", "Masses", "opacityPP"}},
-    {"Color", {"Cd", "color", "Colour", "colour", "rgbPP"}},
+    {"Radius", {"pscale", "radius", "radiusPP", "SmoothingLength", "SmoothingLengths", "Hsml"}},
+    {"Density", {"density", "Mass", "mass", "Masses", "opacityPP", "masses"}},
+    {"Color", {"Cd", "color", "Colour", "colour", "rgbPP", "Cs"}},
     {"Absorption", {"absorption"}},
     {"Emission", {"emission"}},
-    {"Velocity", {"v", "velocity", "vel", "Velocities"}},
-    {"ID", {"id", "particleId", "ParticleIDs", "ids"}},
+    {"Velocity", {"v", "velocity", "vel", "Velocities", "velocities", "velocityPP"}},
+    {"ID", {"id", "particleId", "ParticleIDs", "ids", "particle_id", "Ids"}},
 };
 
 }  // namespace

@@ -2,23 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <filesystem>
-#include <limits>
 #include <optional>
 
 #include "host/core/error.h"
-#include "host/core/parallel.h"
 #include "host/particles/generate.h"
 #include "host/particles/our_channels.h"
+#include "host/particles/wide_positions.h"
 #include "host/scene/missing_file.h"
-#include "host/scene/origin.h"
 
 namespace mote {
 namespace {
-
-constexpr std::size_t kGrain = 1 << 15;
 
 [[noreturn]] void throwMissingChannel(const ParticleSource& source, const ParticleFile& file, const std::string& field,
                                       const std::string& name) {
@@ -83,33 +77,6 @@ void addLooks(const ParticleSource& source, const ParticleFile& file, LoadedSour
     requests.push_back({name.theirs, &set.emission});
 }
 
-/// Whether a number may need more than float32 has.
-bool isWide(NumberType type) { return numberSize(type) >= 4 && type != NumberType::F32; }
-
-/// Positions that may lie far from the origin: as floats about a centre of their own where that keeps more of them.
-void takePositions(const std::vector<dvec3>& from, LoadedSource& loaded) {
-  struct Box {
-    dvec3 lo{std::numeric_limits<double>::infinity()}, hi{-std::numeric_limits<double>::infinity()};
-  };
-  std::vector<Box> boxes((from.size() + kGrain - 1) / kGrain);
-  parallelBlocks(from.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    Box& box = boxes[begin / kGrain];
-    for (std::size_t i = begin; i < end; ++i) {
-      const dvec3 size = glm::abs(from[i]);  // what is no number or none of float32 will be left out
-      if (!(std::max({size.x, size.y, size.z}) <= std::numeric_limits<float>::max())) continue;
-      if (std::isnan(size.y) || std::isnan(size.z)) continue;
-      box.lo = glm::min(box.lo, from[i]), box.hi = glm::max(box.hi, from[i]);
-    }
-  });
-  Box all;
-  for (const Box& box : boxes) all.lo = glm::min(all.lo, box.lo), all.hi = glm::max(all.hi, box.hi);
-  if (all.lo.x <= all.hi.x) loaded.centre = originOf(all.lo, all.hi);
-  loaded.set.position.resize(from.size());
-  parallelBlocks(from.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) loaded.set.position[i] = vec3(from[i] - loaded.centre);
-  });
-}
-
 }  // namespace
 
 LoadedSource readSource(const ParticleSource& source, const std::string& path, double framesPerSecond,
@@ -141,7 +108,7 @@ LoadedSource readSource(const ParticleSource& source, const std::string& path, d
   if (const auto name = nameInFile(source, file, "ID"); wanted(source, file, "ID", name))
     requests.push_back({name.theirs, &set.id});
   file.read(requests);
-  if (exact) takePositions(wide, loaded);
+  if (exact) loaded.centre = toFloats(wide, set.position);
   loaded.count = set.size();
   if (set.density.empty() && channels == SourceChannels::All) set.density.assign(set.size(), source.density);
   return loaded;
