@@ -37,8 +37,8 @@ struct LoadRules {
 /// the source's `density` and `color` hold. Radius by the source's rule, in the file's own units: Auto takes the
 /// channel Radius if there is one (a generator's own radii), else 1.5 × meanNeighbourDistance for all of the source.
 /// Then the file's axes and unit where the source says so (file_units.h), scale, rotate about x, y, z and translate, in
-/// double; radii, whatever their rule, and velocities scale along,
-/// and cross-sections with the square (in mode Peak: densities stay); colour, absorption and emission stay.
+/// double; radii, whatever their rule, and velocities scale along, and cross-sections with the square (in mode Peak:
+/// densities stay); colour, absorption and emission stay.
 ///
 /// Where only some sources have Color, Velocity, Emission or ID, the rest get their `color`, zero, zero, and the index
 /// in the sources, one after the other. Where only some have Absorption, the rest get what Color leaves of 1, max(0, 1
