@@ -7,6 +7,7 @@
 #include "host/core/error.h"
 #include "host/core/log.h"
 #include "host/core/parallel.h"
+#include "host/core/sampling.h"
 #include "host/core/timer.h"
 #include "host/lighting/auto_subsample.h"
 #include "host/lighting/medium.h"

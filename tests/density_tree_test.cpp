@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "host/core/sampling.h"
 #include "host/lighting/auto_subsample.h"
 #include "host/lighting/lighting.h"
 #include "host/lighting/medium.h"

@@ -1,20 +1,15 @@
 #include "host/lighting/density_tree.h"
 
-#include <tbb/parallel_sort.h>
-
 #include <cmath>
 
 #include "host/core/error.h"
 #include "host/core/parallel.h"
-#include "host/core/random.h"
+#include "host/core/sampling.h"
 
 namespace mote {
 namespace {
 
 constexpr std::size_t kGrain = 1 << 14;
-/// Sets the choice apart from everything else that a seed decides.
-constexpr std::uint64_t kSampleStream = 0x5a3b1e;
-
 /// The particles that go into the tree, as arrays of their own.
 struct Chosen {
   std::vector<std::uint32_t> index;  ///< in the input, ascending
@@ -63,21 +58,6 @@ Chosen gather(const DensityInput& input, const DensityRules& rules) {
 }
 
 }  // namespace
-
-bool isSampled(std::uint64_t id, std::uint64_t seed, float fraction) {
-  return uniformDouble(hashBits(seed, id, kSampleStream)) < fraction;
-}
-
-double meanIdShare(std::span<const std::uint64_t> ids) {
-  std::vector<std::uint64_t> sorted(ids.begin(), ids.end());
-  tbb::parallel_sort(sorted.begin(), sorted.end());
-  double pairs = 0;
-  for (std::size_t begin = 0, end = 0; begin < sorted.size(); begin = end) {
-    while (end < sorted.size() && sorted[end] == sorted[begin]) ++end;
-    pairs += double(end - begin) * double(end - begin);
-  }
-  return sorted.empty() ? 0 : pairs / static_cast<double>(sorted.size());
-}
 
 DensityTree::DensityTree(const DensityInput& input, const DensityRules& rules) {
   MOTE_CHECK(rules.fraction, >, 0.0f);
