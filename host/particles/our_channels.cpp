@@ -56,4 +56,10 @@ ChannelName nameInFile(const ParticleSource& source, const ParticleFile& file, c
   return {ours, false};
 }
 
+std::string ourNameOf(const ParticleFile& file, const std::string& theirs) {
+  for (const OurChannel& channel : kChannels)
+    if (const std::string ours(channel.ours); nameInFile({}, file, ours).theirs == theirs) return ours;
+  return "";
+}
+
 }  // namespace mote

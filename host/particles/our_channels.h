@@ -24,4 +24,7 @@ struct ChannelName {
 /// names that other programs use.
 ChannelName nameInFile(const ParticleSource& source, const ParticleFile& file, const std::string& ours);
 
+/// The one of our channels that a file's channel is, by its name; empty: none.
+std::string ourNameOf(const ParticleFile& file, const std::string& theirs);
+
 }  // namespace mote

@@ -16,6 +16,17 @@ constexpr std::size_t kGrain = 1 << 15;
 
 }  // namespace
 
+glm::dmat3 rotationAbout(const dvec3& degrees) {
+  dmat4 rotation(1);
+  for (const int axis : {2, 1, 0}) {
+    if (degrees[axis] == 0) continue;  // exact, not merely close
+    dvec3 about(0);
+    about[axis] = 1;
+    rotation = glm::rotate(rotation, glm::radians(degrees[axis]), about);
+  }
+  return glm::dmat3(rotation);
+}
+
 void applyRadiusRule(const ParticleSource& source, LoadedSource& loaded) {
   ParticleSet& set = loaded.set;
   switch (source.radius.kind) {
@@ -41,14 +52,7 @@ Placement placementOf(const ParticleSource& source, DensityMode mode, const Load
   Placement place;
   place.scale = source.scale * units.length;
   place.area = mode == DensityMode::Peak ? 1 : place.scale * place.scale;
-  dmat4 rotation(1);
-  if (source.rotate != vec3(0))
-    for (const int axis : {2, 1, 0}) {  // Rz · Ry · Rx: x is applied first
-      dvec3 about(0);
-      about[axis] = 1;
-      rotation = glm::rotate(rotation, glm::radians(static_cast<double>(source.rotate[axis])), about);
-    }
-  place.linear = (glm::dmat3(rotation) * place.scale) * units.axes;
+  place.linear = (rotationAbout(dvec3(source.rotate)) * place.scale) * units.axes;
   place.shift = place.linear * loaded.centre + source.translate;
   place.stays = source.scale == 1 && source.rotate == vec3(0) && units.none();
   place.velocity = units.velocity;

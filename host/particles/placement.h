@@ -6,6 +6,9 @@
 
 namespace mote {
 
+/// Rz · Ry · Rx: x is applied first. `degrees` about each axis.
+glm::dmat3 rotationAbout(const dvec3& degrees);
+
 /// Gives every particle a radius by the source's rule, in the file's own units: a number, a channel times a factor, or
 /// for Auto the channel where there is one, else 1.5 × meanNeighbourDistance for all of the source. Throws InputError
 /// where there is no spacing to take a radius from.

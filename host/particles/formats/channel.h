@@ -1,6 +1,7 @@
 // What any file of particles holds, whatever its format: channels of numbers, and values that are not of a particle.
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <variant>
@@ -38,17 +39,21 @@ struct Metadata {
   static Metadata float32s(std::string channel, std::string name, const std::vector<float>& values);
 };
 
+/// Takes a channel's raw numbers as they are read, particle after particle in any number of pieces.
+using RawTaker = std::function<void(std::vector<std::byte>&& piece)>;
+
 /// A channel to read and where to put it: the vector is cleared, then gets one entry a particle.
 ///   float, double, uint64   a channel of arity 1
 ///   vec3, dvec3             arity 3 or more (the first three numbers), or 1 (the number three times)
 ///   std::byte               any: the raw numbers, Channel::bytes() a particle, little-endian
+///   RawTaker                any: the same, in pieces, so that a file need not fit in memory (block_reader.h)
 /// Numbers are converted as numbers (uint8 255 becomes 255.0f); for uint64, signed integers keep their bits and
-/// floats are cut to integers, 0 where they are negative or not numbers. All but std::byte are multiplied with
+/// floats are cut to integers, 0 where they are negative or not numbers. All but raw numbers are multiplied with
 /// Channel::scale.
 struct ChannelRequest {
   std::string channel;
   std::variant<std::vector<float>*, std::vector<double>*, std::vector<vec3>*, std::vector<dvec3>*,
-               std::vector<std::uint64_t>*, std::vector<std::byte>*>
+               std::vector<std::uint64_t>*, std::vector<std::byte>*, RawTaker*>
       target;
 };
 

@@ -59,6 +59,9 @@ void scaleBy(double factor, std::span<To> numbers) {
   for (To& number : numbers) number = converted<To>(static_cast<double>(number) * factor);
 }
 
+template <class Target>
+constexpr bool kIsRaw = std::is_same_v<Target, std::vector<std::byte>> || std::is_same_v<Target, RawTaker>;
+
 template <class T>
 constexpr bool kIsVector = std::is_same_v<T, vec3> || std::is_same_v<T, dvec3>;
 
@@ -66,14 +69,14 @@ template <class T>
 void appendTo(std::vector<T>& to, const Channel& channel, const Rows& rows) {
   if (rows.count == 0) return;
   if constexpr (std::is_same_v<T, std::byte>) {
-    const std::size_t size = numberSize(channel.type);
-    for (std::size_t i = 0; i < rows.count; ++i) {
-      const std::byte* from = rows.from + i * rows.stride;
-      const std::size_t old = to.size();
-      to.insert(to.end(), from, from + channel.bytes());
+    const std::size_t size = numberSize(channel.type), bytes = channel.bytes(), old = to.size();
+    to.resize(old + rows.count * bytes);
+    std::byte* out = to.data() + old;
+    const std::byte* from = rows.from;
+    for (std::size_t i = 0; i < rows.count; ++i, from += rows.stride, out += bytes) {
+      std::memcpy(out, from, bytes);
       if (rows.swapped)
-        for (std::size_t c = old; c < to.size(); c += size)
-          std::reverse(to.begin() + static_cast<std::ptrdiff_t>(c), to.begin() + static_cast<std::ptrdiff_t>(c + size));
+        for (std::size_t c = 0; c < bytes; c += size) std::reverse(out + c, out + c + size);
     }
   } else {
     const std::size_t old = to.size();
@@ -87,6 +90,14 @@ void appendTo(std::vector<T>& to, const Channel& channel, const Rows& rows) {
       scaleBy(channel.scale, std::span(to).subspan(old));
     }
   }
+}
+
+/// Throws where a channel's numbers are none of type T.
+template <class T>
+void requireArity(const std::string& path, const Channel& channel) {
+  if (channel.arity == 1 || (kIsVector<T> && channel.arity >= 3)) return;
+  throw InputError(path, fmt::format("channel '{}'", channel.name),
+                   kIsVector<T> ? "arity 3 (or 1, or more)" : "arity 1", fmt::format("arity {}", channel.arity));
 }
 
 }  // namespace
@@ -111,26 +122,36 @@ ChannelSink::ChannelSink(const std::string& path, std::span<const Channel> chann
   index_ = static_cast<std::size_t>(found - channels.begin());
   channel_ = *found;
   std::visit(
-      [&]<class T>(std::vector<T>*) {
-        constexpr bool kRaw = std::is_same_v<T, std::byte>;
-        if (kRaw || channel_.arity == 1 || (kIsVector<T> && channel_.arity >= 3)) return;
-        throw InputError(path, fmt::format("channel '{}'", request.channel),
-                         kIsVector<T> ? "arity 3 (or 1, or more)" : "arity 1", fmt::format("arity {}", channel_.arity));
+      [&]<class Target>(Target*) {
+        if constexpr (!kIsRaw<Target>) requireArity<typename Target::value_type>(path, channel_);
       },
       target_);
 }
 
 void ChannelSink::reserve(std::uint64_t particles) {
   std::visit(
-      [&]<class T>(std::vector<T>* to) {
-        to->clear();
-        to->reserve(particles * (std::is_same_v<T, std::byte> ? channel_.bytes() : 1));
+      [&]<class Target>(Target* to) {
+        if constexpr (!std::is_same_v<Target, RawTaker>) {
+          to->clear();
+          to->reserve(particles * (kIsRaw<Target> ? channel_.bytes() : 1));
+        }
       },
       target_);
 }
 
 void ChannelSink::append(const std::byte* from, std::size_t stride, std::size_t count, bool bigEndian) {
-  std::visit([&](auto* to) { appendTo(*to, channel_, {from, stride, count, bigEndian}); }, target_);
+  const Rows rows{from, stride, count, bigEndian};
+  std::visit(
+      [&]<class Target>(Target* to) {
+        if constexpr (std::is_same_v<Target, RawTaker>) {
+          std::vector<std::byte> piece;
+          appendTo(piece, channel_, rows);
+          if (count > 0) (*to)(std::move(piece));
+        } else {
+          appendTo(*to, channel_, rows);
+        }
+      },
+      target_);
 }
 
 }  // namespace mote

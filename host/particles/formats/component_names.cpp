@@ -23,12 +23,22 @@ constexpr Vector kVectors[] = {{{"x", "y", "z"}, "Position"},    {{"X", "Y", "Z"
                                {{"R", "G", "B"}, "Color"},       {{"red", "green", "blue"}, "Color"}};
 constexpr std::string_view kEndings[] = {"_x", "_y", "_z", ".x", ".y", ".z"};
 
-bool sideBySide(const PlacedChannel* c) {
-  const std::size_t size = numberSize(c[0].channel.type);
-  for (std::size_t k = 0; k < 3; ++k)
-    if (c[k].channel.arity != 1 || c[k].channel.type != c[0].channel.type || c[k].offset != c[0].offset + k * size)
-      return false;
-  return true;
+/// Whether the scalar c[k] stands where component k of a vector that begins with c[0] would.
+bool follows(const PlacedChannel* c, std::size_t k) {
+  return c[k].channel.arity == 1 && c[k].channel.type == c[0].channel.type &&
+         c[k].offset == c[0].offset + k * numberSize(c[0].channel.type);
+}
+
+bool sideBySide(const PlacedChannel* c) { return follows(c, 0) && follows(c, 1) && follows(c, 2); }
+
+/// NAME[0] NAME[1] … from c on: how many of at most `most`, and NAME.
+std::pair<std::size_t, std::string> numbered(const PlacedChannel* c, std::size_t most) {
+  const std::string& first = c[0].channel.name;
+  if (first.size() <= 3 || !first.ends_with("[0]") || !follows(c, 0)) return {0, ""};
+  const std::string name = first.substr(0, first.size() - 3);
+  std::size_t count = 1;
+  while (count < most && follows(c, count) && c[count].channel.name == fmt::format("{}[{}]", name, count)) ++count;
+  return {count, name};
 }
 
 /// The name of the vector that three scalars are.
@@ -63,16 +73,18 @@ std::vector<PlacedChannel> withVectors(const std::vector<PlacedChannel>& columns
   for (std::size_t k = 0; k < columns.size();) {
     const PlacedChannel* c = &columns[k];
     std::optional<std::string> name;
+    std::size_t arity = 3;
     if (k + 3 <= columns.size() && sideBySide(c)) name = vectorName(c);
+    if (auto [count, of] = numbered(c, columns.size() - k); count >= 2) name = std::move(of), arity = count;
     if (!name || taken(*name)) {
       channels.push_back(columns[k++]);
       continue;
     }
     PlacedChannel vector = *c;
-    vector.channel.name = *name, vector.channel.arity = 3;
-    if (*name == "Color") vector.channel.scale = scaleOfColor(vector.channel.type);
+    vector.channel.name = *name, vector.channel.arity = static_cast<std::uint32_t>(arity);
+    if (*name == "Color" && arity == 3) vector.channel.scale = scaleOfColor(vector.channel.type);
     channels.push_back(vector);
-    k += 3;
+    k += arity;
   }
   return channels;
 }

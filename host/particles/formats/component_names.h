@@ -23,7 +23,7 @@ struct PlacedChannel {
 ///   nx ny nz                         Normal
 ///   r g b, red green blue            Color; of 8 or 16 bits it is a share of their greatest number
 ///   NAME_x NAME_y NAME_z, NAME.x …   NAME
-/// Everything else stays as it is.
+/// So do NAME[0] NAME[1] …, as many as there are (two or more), which become NAME. Everything else stays as it is.
 std::vector<PlacedChannel> withVectors(const std::vector<PlacedChannel>& columns);
 
 /// The columns of a table that says no names: Position (3), Position and Density (4), Position and Velocity (6), else

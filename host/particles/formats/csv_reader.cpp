@@ -205,13 +205,11 @@ void CsvReader::read(std::span<const ChannelRequest> requests) const {
       eachField(line, separator_, [&](std::string_view field) {
         if (k >= columns_.size()) return void(++k);
         const PlacedChannel& column = columns_[k++];
-        const std::optional<double> value = numberIn(field);
-        if (!value)
+        if (!storeNumberIn(field, column.channel.type, &rows[here * rowBytes_ + column.offset]))
           throw InputError(path_,
                            fmt::format("line {}, column {}{}", lines.number(), k,
                                        column.channel.name.empty() ? "" : " (" + column.channel.name + ")"),
                            "a number", fmt::format("'{}'", field.substr(0, 40)));
-        storeNumber(*value, column.channel.type, &rows[here * rowBytes_ + column.offset]);
       });
       if (k != columns_.size())
         throw InputError(path_, fmt::format("line {}", lines.number()), fmt::format("{} columns", columns_.size()),

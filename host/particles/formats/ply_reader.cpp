@@ -297,12 +297,10 @@ void PlyReader::readText(std::vector<ChannelSink>& sinks) const {
     for (std::size_t i = 0; i < here; ++i)
       for (const PlacedChannel& column : columns_) {
         const std::string word = bytes.word(kMostDigits);
-        const std::optional<double> value = numberIn(word);
-        if (!value)
+        if (!storeNumberIn(word, column.channel.type, &rows[i * rowBytes_ + column.offset]))
           throw InputError(path_, fmt::format("particle {} of {}, {}", first + i, count_, column.channel.name),
                            "a number", word.empty() ? "the file's end" : "'" + word + "'",
                            word.empty() ? "the file is cut off" : "");
-        storeNumber(*value, column.channel.type, &rows[i * rowBytes_ + column.offset]);
       }
     for (ChannelSink& sink : sinks) sink.append(rows.data() + placed_[sink.index()].offset, rowBytes_, here);
   }

@@ -25,6 +25,8 @@ constexpr std::uint32_t kVersion = 3;
 constexpr std::uint64_t kMostChannelBytes = 50000;  // as its makers' reader has it
 constexpr std::uint64_t kMostMetadataBytes = 1 << 20, kMostParticleBytes = 1 << 20;
 constexpr std::uint64_t kNotClosed = ~std::uint64_t{0};
+/// Ends hints about files of which particles can be saved.
+constexpr const char* kRepair = "; mote repair IN OUT saves the particles that are there";
 /// LZ4 counts in int.
 constexpr std::uint64_t kMostBlockBytes = std::uint64_t{1} << 30;
 
@@ -60,7 +62,8 @@ void unpack(const std::string& path, bool lz4, std::span<const std::byte> from, 
   if (size != to.size())
     throw InputError(path, fmt::format("block at particle {}", particle),
                      fmt::format("{} bytes of particles in valid {} data", to.size(), lz4 ? "LZ4" : "zlib"),
-                     size > 0 ? fmt::format("{} bytes", size) : "something else", "the file is damaged");
+                     size > 0 ? fmt::format("{} bytes", size) : "something else",
+                     fmt::format("the file is damaged{}", kRepair));
 }
 
 /// Byte k of particle j stands at j + k · count: back to one particle behind the other.
@@ -71,6 +74,13 @@ void untranspose(std::span<const std::byte> from, std::size_t count, std::span<s
 }
 
 }  // namespace
+
+/// A block's particles, one behind the other.
+struct Prt2Reader::Block {
+  std::vector<std::byte> rows, turned;
+  std::vector<double> positions;  ///< where blocks have offsets
+  std::size_t count = 0;
+};
 
 /// A chunk of the file.
 class Prt2Reader::Chunk : public Section {
@@ -109,7 +119,7 @@ bool beginsAsPrt2(std::span<const std::byte> start) {
   return start.size() >= sizeof kMagic && std::memcmp(start.data(), kMagic, sizeof kMagic) == 0;
 }
 
-Prt2Reader::Prt2Reader(std::string path) : ParticleFile(path), file_(std::move(path)) {
+Prt2Reader::Prt2Reader(std::string path, WhatIsWrong* salvage) : ParticleFile(path), file_(std::move(path)) {
   Chunk start(file_, "magic number", 0, file_.bytes());
   if (std::memcmp(start.bytes(sizeof kMagic).data(), kMagic, sizeof kMagic) != 0)
     throw InputError(path_, "PRT 2 magic number", "\\xC0PRT2\\r\\n\\x1A", "something else");
@@ -117,29 +127,44 @@ Prt2Reader::Prt2Reader(std::string path) : ParticleFile(path), file_(std::move(p
     throw InputError(path_, "PRT 2 version", fmt::format("{}", kVersion), fmt::format("{}", version));
   std::vector<Stream> streams;
   std::vector<std::string> indexed;
-  for (std::uint64_t at = start.position(); at < file_.bytes();) {
-    Chunk head(file_, "a chunk's head", at, file_.bytes());
-    const std::string kind = head.bytes(4);
-    const auto size = head.number<std::uint64_t>();
-    if (size > head.left())
+  std::uint64_t at = start.position();
+  try {
+    while (at < file_.bytes() && readChunk(at, streams, indexed, salvage != nullptr)) {
+    }
+  } catch (const InputError&) {
+    if (!salvage || streams.empty()) throw;  // what is wrong behind the particles does them no harm
+  }
+  choose(streams, indexed, salvage);
+  format_ = stream_.name.empty() ? "PRT 2" : "SPRT, " + stream_.name;
+}
+
+/// Reads the chunk at `at` and moves there behind it. False: what follows cannot be found.
+bool Prt2Reader::readChunk(std::uint64_t& at, std::vector<Stream>& streams, std::vector<std::string>& indexed,
+                           bool salvage) {
+  Chunk head(file_, "a chunk's head", at, file_.bytes());
+  const std::string kind = head.bytes(4);
+  const bool particles = kind == "Part" || kind == "PrtO";
+  auto size = head.number<std::uint64_t>();
+  if (size > head.left()) {
+    if (!salvage || !particles)
       throw InputError(path_, fmt::format("chunk {} at byte {}", shown(kind), at),
                        fmt::format("at most {} bytes", head.left()), fmt::format("{}", size),
-                       "the file is cut off or damaged");
-    Chunk chunk(file_, kind, head.position(), head.position() + size);
-    if ((kind == "Chan") != channels_.empty())
-      throw InputError(path_, fmt::format("chunk {} at byte {}", shown(kind), at), "'Chan' first, once", shown(kind));
-    if (kind == "Chan")
-      readChannels(chunk);
-    else if (kind == "Meta")
-      readMetadata(chunk);
-    else if (kind == "Part" || kind == "PrtO")
-      streams.push_back(readStream(chunk, kind == "PrtO"));
-    else if (kind == "PIdx")
-      checkIndex(chunk, streams, indexed);
-    at = chunk.end();
+                       fmt::format("the file is cut off or damaged{}", particles ? kRepair : ""));
+    size = head.left();
   }
-  choose(streams, indexed);
-  format_ = stream_.name.empty() ? "PRT 2" : "SPRT, " + stream_.name;
+  Chunk chunk(file_, kind, head.position(), head.position() + size);
+  if ((kind == "Chan") != channels_.empty())
+    throw InputError(path_, fmt::format("chunk {} at byte {}", shown(kind), at), "'Chan' first, once", shown(kind));
+  at = chunk.end();
+  if (kind == "Chan")
+    readChannels(chunk);
+  else if (kind == "Meta")
+    readMetadata(chunk);
+  else if (particles)
+    streams.push_back(readStream(chunk, kind == "PrtO", salvage));
+  else if (kind == "PIdx" && !salvage)
+    checkIndex(chunk, streams, indexed);
+  return !(particles && salvage && streams.back().particles == kNotClosed);  // nor was its chunk's size written then
 }
 
 void Prt2Reader::readChannels(Chunk& chunk) {
@@ -191,7 +216,7 @@ void Prt2Reader::readMetadata(Chunk& chunk) {
   metadata_.push_back(std::move(entry));
 }
 
-Prt2Reader::Stream Prt2Reader::readStream(Chunk& chunk, bool offsets) const {
+Prt2Reader::Stream Prt2Reader::readStream(Chunk& chunk, bool offsets, bool salvage) const {
   Stream stream;
   stream.name = chunk.text(), stream.compression = chunk.text();
   stream.particles = chunk.number<std::uint64_t>(), stream.blocks = chunk.number<std::uint64_t>();
@@ -203,9 +228,12 @@ Prt2Reader::Stream Prt2Reader::readStream(Chunk& chunk, bool offsets) const {
   if (!stream.packed() && c != "uncompressed" && c != "transpose")
     throw InputError(path_, fmt::format("stream {}", shown(stream.name)),
                      "uncompressed, zlib, lz4, transpose, transpose-zlib or transpose-lz4", shown(c));
-  if (stream.blocks == kNotClosed || stream.particles == kNotClosed)
-    throw InputError(path_, fmt::format("stream {}", shown(stream.name)), "a count of particles",
-                     "none: it was not closed", "whatever wrote it stopped before its end");
+  if (stream.blocks == kNotClosed || stream.particles == kNotClosed) {
+    if (!salvage)
+      throw InputError(path_, fmt::format("stream {}", shown(stream.name)), "a count of particles",
+                       "none: it was not closed", fmt::format("whatever wrote it stopped before its end{}", kRepair));
+    stream.particles = stream.blocks = kNotClosed, stream.end = file_.bytes();
+  }
   return stream;
 }
 
@@ -214,48 +242,117 @@ void Prt2Reader::checkIndex(Chunk& chunk, std::span<const Stream> streams, std::
   const std::string name = chunk.text();
   const auto stream = std::find_if(streams.begin(), streams.end(), [&](const Stream& s) { return s.name == name; });
   if (stream == streams.end())
-    throw InputError(path_, "index", "one of a stream before it", shown(name), "the file is damaged");
+    throw InputError(path_, "index", "one of a stream before it", shown(name),
+                     fmt::format("the file is damaged{}", kRepair));
   const auto count = chunk.number<std::uint64_t>();
   std::uint64_t bytes = 0, particles = 0;
   for (std::uint64_t k = 0; k < count; ++k) {
     const std::uint64_t size = chunk.varint(), here = chunk.varint();
     if (size > stream->end - stream->begin - bytes || here > stream->particles - particles)
       throw InputError(path_, fmt::format("index of stream {}", shown(name)), "blocks within the stream",
-                       fmt::format("more from block {} on", k), "the file is damaged");
+                       fmt::format("more from block {} on", k), fmt::format("the file is damaged{}", kRepair));
     bytes += size, particles += here;
   }
   if (count != stream->blocks || bytes != stream->end - stream->begin || particles != stream->particles)
     throw InputError(path_, fmt::format("index of stream {}", shown(name)),
                      fmt::format("{} blocks, {} bytes, {} particles", stream->blocks, stream->end - stream->begin,
                                  stream->particles),
-                     fmt::format("{}, {}, {}", count, bytes, particles), "the file is cut off or damaged");
+                     fmt::format("{}, {}, {}", count, bytes, particles),
+                     fmt::format("the file is cut off or damaged{}", kRepair));
   indexed.push_back(name);
 }
 
-void Prt2Reader::choose(std::span<const Stream> streams, std::span<const std::string> indexed) {
+void Prt2Reader::choose(std::span<const Stream> streams, std::span<const std::string> indexed, WhatIsWrong* salvage) {
   if (streams.empty())
     throw InputError(path_, "", "a stream of particles (chunk 'Part' or 'PrtO')", "none",
                      "the file is cut off, or whatever wrote it stopped before its end");
   const Stream* best = &streams[0];
   for (const Stream& stream : streams) {
-    if (std::find(indexed.begin(), indexed.end(), stream.name) == indexed.end())
+    if (!salvage && std::find(indexed.begin(), indexed.end(), stream.name) == indexed.end())
       throw InputError(path_, fmt::format("stream {}", shown(stream.name)), "an index (chunk 'PIdx')", "none",
-                       "the file is cut off, or whatever wrote it stopped before its end");
+                       fmt::format("the file is cut off, or whatever wrote it stopped before its end{}", kRepair));
     if (!best->name.empty() && (stream.name.empty() || stream.particles > best->particles)) best = &stream;
   }
   stream_ = *best;
   count_ = stream_.particles;
   const std::uint64_t bytes = stream_.end - stream_.begin, most = stream_.packed() ? bytes * kDeflateExpansion : bytes;
-  if (count_ > most / particleBytes_)
+  if (!salvage && count_ > most / particleBytes_)
     throw InputError(path_, "particle count",
                      fmt::format("at most {}, what {} bytes can hold", most / particleBytes_, bytes),
-                     fmt::format("{}", count_), "the file is damaged");
-  if (!stream_.offsets) return;
-  for (std::size_t k = 0; k < channels_.size(); ++k)
+                     fmt::format("{}", count_), fmt::format("the file is damaged{}", kRepair));
+  for (std::size_t k = 0; stream_.offsets && k < channels_.size(); ++k)
     if (channels_[k].name == "Position" && channels_[k].arity == 3) {
       position_ = k, storedPosition_ = channels_[k].type;
       channels_[k].type = NumberType::F64;
     }
+  if (salvage) countWhole(*salvage);
+}
+
+void Prt2Reader::countWhole(WhatIsWrong& wrong) {
+  const Stream asWritten = stream_;
+  if (asWritten.particles != kNotClosed) wrong.promised = asWritten.particles;
+  Chunk blocks(file_, "Part", stream_.begin, stream_.end);
+  Block block;
+  stream_.blocks = 0, stream_.particles = 0, count_ = kNotClosed;  // for the while: any number may come
+  while (blocks.left() > 0) {
+    try {
+      readBlock(blocks, stream_.particles, block);
+    } catch (const InputError& error) {
+      wrong.sentence = std::string(error.what()).substr(path_.size() + 2);
+      break;
+    }
+    stream_.particles += block.count, ++stream_.blocks;
+    stream_.end = blocks.position();
+  }
+  count_ = stream_.particles;
+  if (!wrong.sentence.empty()) return;
+  if (!wrong.promised)
+    wrong.sentence = "the number of particles was never written; every block that was begun is there";
+  else if (*wrong.promised != count_)
+    wrong.sentence = fmt::format("the header promises {}", *wrong.promised);
+}
+
+/// The next block, unpacked; `done` particles are in front of it.
+void Prt2Reader::readBlock(Chunk& blocks, std::uint64_t done, Block& block) const {
+  const auto fail = [&](const std::string& expected, const std::string& got) {
+    throw InputError(path_, fmt::format("block at particle {}", done), expected, got,
+                     fmt::format("the file is damaged{}", kRepair));
+  };
+  std::uint64_t bytes = blocks.number<std::uint32_t>();
+  const std::uint64_t here = blocks.number<std::uint32_t>();
+  if (here > count_ - done) fail(fmt::format("at most {} particles", count_ - done), fmt::format("{}", here));
+  float offset[3] = {};
+  if (stream_.offsets) {
+    if (bytes < sizeof offset) fail("an offset of 12 bytes", fmt::format("{}", bytes));
+    for (float& number : offset) number = blocks.number<float>();
+    bytes -= sizeof offset;
+  }
+  const std::uint64_t size = here * particleBytes_;
+  if (stream_.packed() ? size > std::min(bytes * kDeflateExpansion, kMostBlockBytes) : size != bytes)
+    fail(fmt::format("the bytes of {} particles", here), fmt::format("{}", bytes));
+  const std::string data = blocks.bytes(bytes);
+  const auto raw = std::as_bytes(std::span(data));
+  block.count = here;
+  block.rows.resize(size);
+  if (here == 0) return;
+  if (stream_.packed())
+    unpack(path_, stream_.lz4, raw, block.rows, done);
+  else
+    std::copy(raw.begin(), raw.end(), block.rows.begin());
+  if (stream_.transposed) {
+    block.turned.resize(size);
+    untranspose(block.rows, here, block.turned);
+    block.rows.swap(block.turned);
+  }
+  if (position_ >= channels_.size()) return;
+  block.positions.resize(3 * here);
+  withNumberType(storedPosition_, [&]<class T>(T) {
+    for (std::size_t i = 0; i < block.positions.size(); ++i) {
+      T number;
+      std::memcpy(&number, &block.rows[i / 3 * particleBytes_ + offsets_[position_] + i % 3 * sizeof(T)], sizeof(T));
+      block.positions[i] = static_cast<double>(number) + static_cast<double>(offset[i % 3]);
+    }
+  });
 }
 
 void Prt2Reader::read(std::span<const ChannelRequest> requests) const {
@@ -263,58 +360,21 @@ void Prt2Reader::read(std::span<const ChannelRequest> requests) const {
   for (const ChannelRequest& request : requests) sinks.emplace_back(path_, channels_, request);
   Chunk blocks(file_, "Part", stream_.begin, stream_.end);
   std::uint64_t done = 0;
-  std::vector<std::byte> rows, turned;
-  std::vector<double> positions;
-  const auto fail = [&](const std::string& expected, const std::string& got) {
-    throw InputError(path_, fmt::format("block at particle {} of {}", done, count_), expected, got,
-                     "the file is damaged");
-  };
+  Block block;
   try {
     for (ChannelSink& sink : sinks) sink.reserve(std::min<std::uint64_t>(count_, 1 << 20));
-    for (std::uint64_t block = 0; block < stream_.blocks; ++block) {
-      std::uint64_t bytes = blocks.number<std::uint32_t>();
-      const std::uint64_t here = blocks.number<std::uint32_t>();
-      if (here > count_ - done) fail(fmt::format("at most {} particles", count_ - done), fmt::format("{}", here));
-      float offset[3] = {};
-      if (stream_.offsets) {
-        if (bytes < sizeof offset) fail("an offset of 12 bytes", fmt::format("{}", bytes));
-        for (float& number : offset) number = blocks.number<float>();
-        bytes -= sizeof offset;
-      }
-      const std::uint64_t size = here * particleBytes_;
-      if (stream_.packed() ? size > std::min(bytes * kDeflateExpansion, kMostBlockBytes) : size != bytes)
-        fail(fmt::format("the bytes of {} particles", here), fmt::format("{}", bytes));
-      const std::string data = blocks.bytes(bytes);
-      const auto raw = std::as_bytes(std::span(data));
-      rows.resize(size);
-      if (here == 0) continue;
-      if (stream_.packed())
-        unpack(path_, stream_.lz4, raw, rows, done);
-      else
-        std::copy(raw.begin(), raw.end(), rows.begin());
-      if (stream_.transposed) {
-        turned.resize(size);
-        untranspose(rows, here, turned);
-        rows.swap(turned);
-      }
-      if (position_ < channels_.size()) {
-        positions.resize(3 * here);
-        withNumberType(storedPosition_, [&]<class T>(T) {
-          for (std::size_t i = 0; i < positions.size(); ++i) {
-            T number;
-            std::memcpy(&number, &rows[i / 3 * particleBytes_ + offsets_[position_] + i % 3 * sizeof(T)], sizeof(T));
-            positions[i] = static_cast<double>(number) + static_cast<double>(offset[i % 3]);
-          }
-        });
-      }
+    for (std::uint64_t k = 0; k < stream_.blocks; ++k) {
+      readBlock(blocks, done, block);
       for (ChannelSink& sink : sinks)
         if (sink.index() == position_)
-          sink.append(reinterpret_cast<const std::byte*>(positions.data()), 3 * sizeof(double), here);
+          sink.append(reinterpret_cast<const std::byte*>(block.positions.data()), 3 * sizeof(double), block.count);
         else
-          sink.append(rows.data() + offsets_[sink.index()], particleBytes_, here);
-      done += here;
+          sink.append(block.rows.data() + offsets_[sink.index()], particleBytes_, block.count);
+      done += block.count;
     }
-    if (done != count_) fail(fmt::format("{} particles in all", count_), fmt::format("{}", done));
+    if (done != count_)
+      throw InputError(path_, "particle data", fmt::format("{} particles in all", count_), fmt::format("{}", done),
+                       fmt::format("the file is damaged{}", kRepair));
   } catch (const std::bad_alloc&) {
     throw MachineError(
         fmt::format("{}: not enough memory for {} particles of {} bytes", path_, count_, particleBytes_));

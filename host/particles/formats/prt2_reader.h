@@ -6,9 +6,11 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "host/particles/formats/input_file.h"
 #include "host/particles/formats/particle_file.h"
+#include "host/particles/formats/salvage.h"
 
 namespace mote {
 
@@ -18,7 +20,11 @@ class Prt2Reader : public ParticleFile {
  public:
   /// Throws InputError on any breach of the format in front of the particles and in the chunks' order and sizes; on a
   /// stream that was not closed.
-  explicit Prt2Reader(std::string path);
+  explicit Prt2Reader(std::string path) : Prt2Reader(std::move(path), nullptr) {}
+
+  /// For repair: the particles of all whole blocks in front of the first that is cut off or damaged, whatever counts
+  /// and index say; all of them are unpacked to find out. Throws InputError where there is no stream of particles.
+  Prt2Reader(std::string path, WhatIsWrong& wrong) : Prt2Reader(std::move(path), &wrong) {}
 
   /// Cost: that of zlib, about 0.3 GB/s of particles, or of LZ4, some GB/s.
   void read(std::span<const ChannelRequest> requests) const override;
@@ -33,12 +39,17 @@ class Prt2Reader : public ParticleFile {
     bool packed() const { return deflated || lz4; }
   };
   class Chunk;
+  struct Block;
 
+  Prt2Reader(std::string path, WhatIsWrong* salvage);
+  bool readChunk(std::uint64_t& at, std::vector<Stream>& streams, std::vector<std::string>& indexed, bool salvage);
   void readChannels(Chunk& chunk);
   void readMetadata(Chunk& chunk);
-  Stream readStream(Chunk& chunk, bool offsets) const;
+  Stream readStream(Chunk& chunk, bool offsets, bool salvage) const;
   void checkIndex(Chunk& chunk, std::span<const Stream> streams, std::vector<std::string>& indexed) const;
-  void choose(std::span<const Stream> streams, std::span<const std::string> indexed);
+  void choose(std::span<const Stream> streams, std::span<const std::string> indexed, WhatIsWrong* salvage);
+  void countWhole(WhatIsWrong& wrong);
+  void readBlock(Chunk& blocks, std::uint64_t done, Block& block) const;
 
   InputFile file_;
   Stream stream_;

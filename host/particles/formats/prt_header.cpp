@@ -18,7 +18,9 @@ constexpr std::uint64_t kMaxParticleBytes = 1 << 20;
 
 struct Parser {
   const InputFile& file;
+  bool salvage = false;
   PrtHeader header{};
+  bool countKnown = true;
   const std::string& path = file.path();
   const std::uint64_t fileBytes = file.bytes();
 
@@ -43,11 +45,13 @@ struct Parser {
     if (version != 1 && version != 2) fail("version", "1 (PRT 1.0) or 2 (PRT 1.1)", fmt::format("{}", version));
     header.minorVersion = version - 1;
     const auto count = section.number<std::int64_t>("particle count");
-    if (count == -1)
+    countKnown = count >= 0;
+    if (count == -1 && !salvage)
       fail("particle count", "0 or more", "-1",
-           "the file was not closed correctly: the program writing it crashed or is still running");
-    if (count < 0) fail("particle count", "0 or more", fmt::format("{}", count));
-    header.count = static_cast<std::uint64_t>(count);
+           "the file was not closed correctly: the program writing it crashed or is still running; mote repair IN OUT "
+           "saves the particles that are there");
+    if (count < 0 && !salvage) fail("particle count", "0 or more", fmt::format("{}", count));
+    header.count = countKnown ? static_cast<std::uint64_t>(count) : 0;
     if (length < static_cast<std::int32_t>(kPrtFixedHeader))
       fail("header length", fmt::format("at least {} bytes", kPrtFixedHeader), fmt::format("{}", length));
     if (static_cast<std::uint64_t>(length) > fileBytes)
@@ -225,13 +229,13 @@ struct Parser {
 
 }  // namespace
 
-ParsedPrtHeader parsePrtHeader(const InputFile& file) {
-  Parser parser{file};
+ParsedPrtHeader parsePrtHeader(const InputFile& file, bool salvage) {
+  Parser parser{file, salvage};
   const std::uint64_t length = parser.parseFixed();
   if (parser.header.minorVersion == 1) parser.parseChunks(length);
   const std::uint64_t dataBegin = parser.parseChannels(length);
   parser.checkChannelMetadata();
-  return {std::move(parser.header), dataBegin};
+  return {std::move(parser.header), parser.countKnown, dataBegin};
 }
 
 }  // namespace mote

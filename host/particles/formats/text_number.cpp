@@ -20,6 +20,27 @@ std::optional<double> numberIn(std::string_view word) {
   return error == std::errc() ? std::optional(value) : std::nullopt;
 }
 
+bool storeNumberIn(std::string_view word, NumberType type, std::byte* to) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  // Straight into the type, so that nothing is rounded twice; what is written otherwise (1e3 for an integer, a float
+  // beyond its range) goes by way of double.
+  const bool stored = withNumberType(type, [&]<class T>(T) {
+    if constexpr (std::is_same_v<T, Imath::half>) {
+      return false;
+    } else {
+      T number{};
+      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+      if (error != std::errc() || end != word.data() + word.size()) return false;
+      std::memcpy(to, &number, sizeof number);
+      return true;
+    }
+  });
+  if (stored) return true;
+  const std::optional<double> value = numberIn(word);
+  if (value) storeNumber(*value, type, to);
+  return value.has_value();
+}
+
 void storeNumber(double value, NumberType type, std::byte* to) {
   withNumberType(type, [&]<class T>(T number) {
     if constexpr (std::is_integral_v<T>) {  // 2^63 and 2^64 are the least that do not fit

@@ -246,11 +246,9 @@ void VtkReader::read(std::span<const ChannelRequest> requests) const {
         } else {
           for (std::size_t i = 0; i < here * array.arity; ++i) {
             const std::string word = bytes.word(kMostWord);
-            const std::optional<double> value = numberIn(word);
-            if (!value)
+            if (!storeNumberIn(word, array.type, &rows[i * size]))
               throw InputError(path_, fmt::format("{} of point {}", array.name, first + i / array.arity), "a number",
                                "'" + word.substr(0, 40) + "'");
-            storeNumber(*value, array.type, &rows[i * size]);
           }
         }
         sink.append(rows.data(), row, here, binary_);
