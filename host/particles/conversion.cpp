@@ -202,7 +202,11 @@ ConversionReport convertParticles(std::span<const std::unique_ptr<ParticleFile>>
   }
   writer->finish();
   report.written = writer->count(), report.bytes = writer->bytes();
-  for (const PlannedChannel& planned : plan.channels) report.channels.push_back(planned.written);
+  for (const PlannedChannel& planned : plan.channels) {
+    report.channels.push_back(planned.written);
+    if (options.format == OutputFormat::Prt1 && planned.ours == "Position" && planned.written.changed > 0)
+      report.notes.push_back("positions were rounded to PRT 1.1's float32; --format prt2 keeps them");
+  }
   return report;
 }
 

@@ -145,6 +145,7 @@ bool Prt2Reader::readChunk(std::uint64_t& at, std::vector<Stream>& streams, std:
   const std::string kind = head.bytes(4);
   const bool particles = kind == "Part" || kind == "PrtO";
   auto size = head.number<std::uint64_t>();
+  if (salvage && particles && size == 0) size = head.left();  // its writer did not come to it
   if (size > head.left()) {
     if (!salvage || !particles)
       throw InputError(path_, fmt::format("chunk {} at byte {}", shown(kind), at),
