@@ -23,6 +23,8 @@ void addRenderCommand(CLI::App& app, const CommonOptions& common, int& exitCode)
 void addLightCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
 void addCrosscheckCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
 void addGenerateCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
+void addConvertCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
+void addRepairCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
 void addInfoCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
 void addCompareCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
 void addBenchCommand(CLI::App& app, const CommonOptions& common, int& exitCode);

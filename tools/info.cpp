@@ -36,7 +36,8 @@ Kind kindOf(const std::string& path) {
   if (isParticleFile(path)) return Kind::Particles;
   if (std::memcmp(start, kExrMagic, sizeof kExrMagic) == 0) return Kind::Picture;
   const fs::path extension = fs::path(path).extension();
-  if (extension == ".prt" || extension == ".npy") return Kind::Particles;
+  for (const char* name : {".prt", ".npy", ".ply", ".csv", ".bgeo", ".vtk"})
+    if (extension == name) return Kind::Particles;
   if (extension == ".exr") return Kind::Picture;
   if (extension == ".json") return Kind::Scene;
   throw InputError(path, "",
@@ -44,17 +45,31 @@ Kind kindOf(const std::string& path) {
                    "none of these", "of a scene's other inputs mote info says nothing");
 }
 
+void describe(const std::string& path, bool json) {
+  const Kind kind = kindOf(path);
+  const Json found = kind == Kind::Particles ? describeParticles(path)
+                     : kind == Kind::Picture ? describePicture(path)
+                                             : describeScene(path);
+  if (json)  // one line a file: what jq and every line-wise reader takes
+    fmt::print("{}\n", found.dump(-1, ' ', false, Json::error_handler_t::replace));
+  else
+    kind == Kind::Particles ? printParticles(found) : kind == Kind::Picture ? printPicture(found) : printScene(found);
+}
+
+/// All files, though some may be wrong: who has a hundred frames wants to know which.
 void info(const std::vector<std::string>& files, bool json) {
+  if (files.size() == 1) return describe(files[0], json);
+  std::size_t wrong = 0;
   for (const std::string& path : files) {
-    const Kind kind = kindOf(path);
-    const Json found = kind == Kind::Particles ? describeParticles(path)
-                       : kind == Kind::Picture ? describePicture(path)
-                                               : describeScene(path);
-    if (json)  // one line a file: what jq and every line-wise reader takes
-      fmt::print("{}\n", found.dump(-1, ' ', false, Json::error_handler_t::replace));
-    else
-      kind == Kind::Particles ? printParticles(found) : kind == Kind::Picture ? printPicture(found) : printScene(found);
+    try {
+      describe(path, json);
+    } catch (const InputError& error) {
+      ++wrong;
+      std::fflush(stdout);
+      fmt::print(stderr, "mote: {}\n", error.what());
+    }
   }
+  if (wrong > 0) throw InputError(fmt::format("{} of {} files are not what they should be", wrong, files.size()));
 }
 
 }  // namespace
@@ -100,7 +115,7 @@ void addInfoCommand(CLI::App& app, const CommonOptions&, int&) {
   };
   auto options = std::make_shared<InfoOptions>();
   CLI::App* command = app.add_subcommand("info", "Say what particle files, pictures and scenes hold");
-  command->add_option("files", options->files, "PRT files, OpenEXR pictures, scenes (.json)")
+  command->add_option("files", options->files, "Particle files of any format, OpenEXR pictures, scenes (.json)")
       ->required()
       ->type_name("FILE");
   command->add_flag("--json", options->json, "Print one JSON object a file, each on a line of its own");

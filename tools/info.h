@@ -5,9 +5,9 @@
 
 namespace mote {
 
-/// A PRT file: version, count, channels with the least, mean and greatest of their finite numbers, metadata, bounds and
-/// radius. Not-finite numbers are counted, never refused. Throws InputError as PrtReader does. Reads the particles once
-/// for every GiB of them, which it holds at once.
+/// A particle file of any format: count, channels with the least, mean and greatest of their finite numbers and the one
+/// of ours that each is, metadata, bounds and radius. Not-finite numbers are counted, never refused. Throws InputError
+/// as readers do. Reads the particles once for every GiB of them, which it holds at once.
 nlohmann::ordered_json describeParticles(const std::string& path);
 void printParticles(const nlohmann::ordered_json& info);
 

@@ -11,6 +11,7 @@
 #include "host/particles/file_units.h"
 #include "host/particles/formats/number_visit.h"
 #include "host/particles/formats/particle_file.h"
+#include "host/particles/our_channels.h"
 #include "host/particles/spacing.h"
 #include "host/particles/wide_positions.h"
 #include "tools/info.h"
@@ -99,8 +100,13 @@ Json statisticsOf(const std::vector<std::byte>& raw, std::size_t count, std::uin
   return {{"not_finite", all.notFinite}, {"min", least}, {"mean", mean}, {"max", greatest}};
 }
 
-Json channelJson(const Channel& channel, const std::vector<std::byte>& raw, std::size_t count) {
+/// `ours`: which of our channels it is, else "". Statistics are of the numbers as they stand in the file; `scale` is
+/// what they are multiplied with.
+Json channelJson(const Channel& channel, const std::string& ours, const std::vector<std::byte>& raw,
+                 std::size_t count) {
   Json json = {{"name", channel.name}, {"type", numberName(channel.type)}, {"arity", channel.arity}};
+  json["ours"] = ours.empty() ? Json() : Json(ours);
+  if (channel.scale != 1) json["scale"] = channel.scale;
   json.update(withNumberType(channel.type, [&]<class T>(T) { return statisticsOf<T>(raw, count, channel.arity); }));
   return json;
 }
@@ -117,7 +123,8 @@ Json channelsJson(const ParticleFile& file) {
     std::vector<ChannelRequest> requests;
     for (std::size_t k = begin; k < end; ++k) requests.push_back({channels[k].name, &raw[k - begin]});
     file.read(requests);
-    for (std::size_t k = begin; k < end; ++k) list.push_back(channelJson(channels[k], raw[k - begin], file.count()));
+    for (std::size_t k = begin; k < end; ++k)
+      list.push_back(channelJson(channels[k], ourNameOf(file, channels[k].name), raw[k - begin], file.count()));
   }
   return list;
 }
@@ -142,22 +149,23 @@ Json metadataJson(const ParticleFile& file) {
   return list;
 }
 
+/// The channel that is ours of this name.
 const Json* channelNamed(const Json& channels, const char* name) {
   for (const Json& channel : channels)
-    if (channel["name"] == name) return &channel;
+    if (channel["ours"] == name) return &channel;
   return nullptr;
 }
 
 /// "radius": "auto" of the scene: 1.5 × the mean distance to the nearest 8, of the particles that have a place.
-Json autoRadius(const ParticleFile& file) {
+Json autoRadius(const ParticleFile& file, const std::string& position) {
   std::vector<vec3> positions;
-  if (isWide(file.channel("Position")->type)) {  // distances far from 0 as well
+  if (isWide(file.channel(position)->type)) {  // distances far from 0 as well
     std::vector<dvec3> wide;
-    const ChannelRequest request{"Position", &wide};
+    const ChannelRequest request{position, &wide};
     file.read({&request, 1});
     toFloats(wide, positions);
   } else {
-    const ChannelRequest request{"Position", &positions};
+    const ChannelRequest request{position, &positions};
     file.read({&request, 1});
   }
   std::erase_if(positions,
@@ -170,17 +178,25 @@ Json autoRadius(const ParticleFile& file) {
 
 Json radiusJson(const ParticleFile& file, const Json& channels) {
   if (const Json* radius = channelNamed(channels, "Radius"))
-    return {{"from", "channel Radius"},
+    return {{"from", "channel " + (*radius)["name"].get<std::string>()},
             {"min", (*radius)["min"][0]},
             {"mean", (*radius)["mean"][0]},
             {"max", (*radius)["max"][0]}};
-  const Channel* position = file.channel("Position");
-  if (!position || position->arity < 3) return {{"from", "none: there is no Position of arity 3"}};
-  return autoRadius(file);
+  const Json* position = channelNamed(channels, "Position");
+  if (!position || (*position)["arity"] < 3) return {{"from", "none: there is no Position of arity 3"}};
+  return autoRadius(file, (*position)["name"]);
 }
 
 std::string valueText(const Json& value) {
   return value.is_null() ? "-" : value.is_number_float() ? fmt::format("{:.6g}", value.get<double>()) : value.dump();
+}
+
+/// "pscale (Radius)"
+std::string nameText(const Json& channel) {
+  const auto name = channel["name"].get<std::string>();
+  return channel["ours"].is_null() || channel["ours"] == name
+             ? name
+             : fmt::format("{} ({})", name, channel["ours"].get<std::string>());
 }
 
 void printChannel(const Json& channel) {
@@ -188,12 +204,13 @@ void printChannel(const Json& channel) {
   const auto type = channel["type"].get<std::string>();
   constexpr std::size_t kShownComponents = 16;
   for (std::size_t c = 0; c < std::min(arity, kShownComponents); ++c)
-    fmt::print("  {:<23} {:<12} {:>14} {:>14} {:>14} {:>12}\n", c == 0 ? channel["name"].get<std::string>() : "",
+    fmt::print("  {:<23} {:<12} {:>14} {:>14} {:>14} {:>12}\n", c == 0 ? nameText(channel) : "",
                c > 0        ? ""
                : arity == 1 ? type
                             : fmt::format("{} × {}", arity, type),
                valueText(channel["min"][c]), valueText(channel["mean"][c]), valueText(channel["max"][c]),
                c == 0 ? channel["not_finite"].dump() : "");
+  if (channel.contains("scale")) fmt::print("  {:<23} times {:g}\n", "", channel["scale"].get<double>());
   if (arity > kShownComponents) fmt::print("  {:<23} and {} more components\n", "", arity - kShownComponents);
 }
 

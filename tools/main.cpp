@@ -46,6 +46,8 @@ void addCommands(CLI::App& app, const CommonOptions& common, int& exitCode) {
   addLightCommand(app, common, exitCode);
   addCrosscheckCommand(app, common, exitCode);
   addGenerateCommand(app, common, exitCode);
+  addConvertCommand(app, common, exitCode);
+  addRepairCommand(app, common, exitCode);
   addInfoCommand(app, common, exitCode);
   addCompareCommand(app, common, exitCode);
   addBenchCommand(app, common, exitCode);

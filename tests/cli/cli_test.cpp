@@ -71,13 +71,14 @@ TEST(MoteUsage, HelpListsEveryCommandAndCommonFlag) {
   const ProcessResult help = test::mote({"--help"});
   EXPECT_EQ(help.exitCode, 0);
   EXPECT_EQ(help.err, "");
-  for (const char* word : {"render", "light", "crosscheck", "generate", "info", "compare", "bench", "devices",
-                           "--threads", "--device", "--validate", "--quiet", "--verbose", "--version"})
+  for (const char* word : {"render", "light", "crosscheck", "generate", "convert", "repair", "info", "compare", "bench",
+                           "devices", "--threads", "--device", "--validate", "--quiet", "--verbose", "--version"})
     EXPECT_TRUE(contains(help.out, word));
 }
 
 TEST(MoteUsage, EveryCommandHasItsOwnHelp) {
-  for (const char* command : {"render", "light", "crosscheck", "generate", "info", "compare", "bench", "devices"}) {
+  for (const char* command :
+       {"render", "light", "crosscheck", "generate", "convert", "repair", "info", "compare", "bench", "devices"}) {
     const ProcessResult help = test::mote({command, "--help"});
     EXPECT_EQ(help.exitCode, 0) << command;
     EXPECT_TRUE(contains(help.out, std::string("Usage: mote ") + command));
