@@ -12,10 +12,7 @@
 #include "shaders/glsl/layout/sort.h"
 #include "shaders/glsl/layout/splat.h"
 #include "tests/gpu/gpu_fixture.h"
-
-#if defined(__SANITIZE_ADDRESS__)
-#include <sanitizer/lsan_interface.h>
-#endif
+#include "tests/support/leaks.h"
 
 namespace mote {
 namespace {
@@ -190,17 +187,6 @@ TEST(Validation, CollectsSynchronizationHazards) {
   expectContains(gpu.validationMessages()[0], "SYNC-HAZARD-WRITE-AFTER-WRITE");
 }
 
-// What is allocated while one lives is none of the leak checker's business.
-struct LeakOnPurpose {
-#if defined(__SANITIZE_ADDRESS__)
-  LeakOnPurpose() { __lsan_disable(); }
-  ~LeakOnPurpose() { __lsan_enable(); }
-#else
-  LeakOnPurpose() {}
-  ~LeakOnPurpose() {}
-#endif
-};
-
 TEST(Validation, CollectsWhatIsLeftAtTheEnd) {
   std::shared_ptr<const MessageLog> log;
   {
@@ -209,7 +195,7 @@ TEST(Validation, CollectsWhatIsLeftAtTheEnd) {
     VkFenceCreateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
     VkFence leaked = VK_NULL_HANDLE;
-    const LeakOnPurpose here;
+    const test::LeakOnPurpose here;
     ASSERT_EQ(vkCreateFence(gpu.device().handle(), &info, nullptr, &leaked), VK_SUCCESS);
   }
   ASSERT_FALSE(log->messages().empty());
