@@ -30,13 +30,16 @@ FrameFiles loadFrame(const Scene& scene, int number, FramePurpose purpose) {
   files.number = number;
   std::vector<std::string> paths;
   files.particles = loadParticles(scene.particles, number, LoadRules(scene), &paths);
-  for (const Solid& solid : scene.solids) {
-    Solid placed = solid;
-    placed.translate -= files.particles.origin;
-    const int held = fileFrame(solid.file, number, scene.inputs.missing);
-    files.meshes.push_back(loadMesh(placed, held));
-    paths.push_back(framePath(solid.file, held));
+  paths.insert(paths.end(), scene.imported.begin(), scene.imported.end());
+  std::vector<Solid> placed = scene.solids;
+  std::vector<int> frames;
+  for (Solid& solid : placed) {
+    solid.translate -= files.particles.origin;
+    frames.push_back(fileFrame(solid.file, number, scene.inputs.missing));
+    if (std::string path = framePath(solid.file, frames.back()); paths.empty() || paths.back() != path)
+      paths.push_back(std::move(path));
   }
+  files.meshes = loadMeshes(placed, frames);
   if (purpose == FramePurpose::Picture) files.sprites = readSprites(scene, paths);
   files.inputs = hashInputs(paths);
   files.seconds = timer.seconds();

@@ -26,9 +26,8 @@ struct FrameFiles {
   double seconds = 0;  ///< that loading took
 };
 
-/// Loads them. Of the scene it looks at sources, solids, view, density mode,
-/// frame rate, origin and rules for inputs only. Throws InputError as readers do;
-/// warnings are in the result, not yet logged.
+/// Loads them. Of the scene it looks at sources, solids, view, density mode, frame rate, origin, imported files and rules
+/// for inputs only. Throws InputError as readers do; warnings are in the result, not yet logged.
 FrameFiles loadFrame(const Scene& scene, int number, FramePurpose purpose);
 
 /// Loads a run's frames in turn, each while the one before is lit and drawn: with more than one thread, and particles

@@ -127,9 +127,12 @@ enum class SolidMode { Shaded, Holdout, Hidden };
 
 /// A mesh that stands in the medium.
 struct Solid {
-  std::string pointer;                 ///< where it stands in the scene, "/solids/0": the place of messages
-  std::string name;                    ///< unique; letters, digits, '_'
-  std::string file;                    ///< path as opened; may hold ####
+  std::string pointer;  ///< where it stands in the scene, "/solids/0": the place of messages
+  std::string name;     ///< unique; letters, digits, '_'
+  std::string file;     ///< path as opened; may hold ####
+  /// The only node of a glTF file that counts: its place in the scene, depth first from 0, or from 1 where the scene
+  /// has not one root but several. None: all of the file.
+  std::optional<std::uint32_t> node = std::nullopt;
   SolidMode mode = SolidMode::Shaded;  ///< in the picture: Lambert; cut out of the medium; not at all
   vec3 albedo{0.5f};                   ///< 0–1
   bool castsShadows = true, receivesShadows = true;
@@ -212,7 +215,8 @@ struct InputRules {
 };
 
 struct Scene {
-  std::string path;  ///< as given; the place in messages
+  std::string path;                   ///< as given; the place in messages
+  std::vector<std::string> imported;  ///< files that "import" was read from, as opened
   std::vector<ParticleSource> particles;
   Medium medium;
   bool defaultLights = false;  ///< true: the scene gave no "lights"; one key light is fitted to the bounding box

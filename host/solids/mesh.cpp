@@ -12,7 +12,9 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <tuple>
+#include <utility>
 
 #include "host/core/error.h"
 #include "host/core/log.h"
@@ -85,12 +87,6 @@ void addMesh(const aiMesh& source, const dmat4& transform, Mesh& mesh, LeftOut& 
   }
 }
 
-void addNode(const aiScene& scene, const aiNode& node, const dmat4& parent, Mesh& mesh, LeftOut& leftOut) {
-  const dmat4 transform = parent * fromAssimp(node.mTransformation);
-  for (unsigned i = 0; i < node.mNumMeshes; ++i) addMesh(*scene.mMeshes[node.mMeshes[i]], transform, mesh, leftOut);
-  for (unsigned i = 0; i < node.mNumChildren; ++i) addNode(scene, *node.mChildren[i], transform, mesh, leftOut);
-}
-
 bool hasNormals(const Mesh& mesh) {
   return std::any_of(mesh.normal.begin(), mesh.normal.end(), [](const vec3& normal) { return normal != vec3(0); });
 }
@@ -142,6 +138,76 @@ void checkFile(const Solid& solid, const std::string& path) {
     throw InputError(path, "", "a mesh", "no such file", nearestNames(solid.file, path));
 }
 
+/// A file as Assimp reads it, its nodes depth first.
+class MeshFile {
+ public:
+  /// `solid` is the first that wants it: messages about a missing file name its pattern's frames.
+  MeshFile(const Solid& solid, const std::string& path) : path_(path) {
+    checkFile(solid, path);
+    // What Mote does not read need not be carried along, nor split vertices.
+    importer_.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,
+                                 aiComponent_TEXCOORDS | aiComponent_COLORS | aiComponent_TANGENTS_AND_BITANGENTS |
+                                     aiComponent_BONEWEIGHTS | aiComponent_ANIMATIONS | aiComponent_TEXTURES |
+                                     aiComponent_LIGHTS | aiComponent_CAMERAS);
+    scene_ = importer_.ReadFile(path, aiProcess_Triangulate | aiProcess_RemoveComponent);
+    if (!scene_ || !scene_->mRootNode)
+      throw InputError(path, "", "a mesh (OBJ, PLY, STL, glTF, GLB …)", importer_.GetErrorString());
+    collect(*scene_->mRootNode, dmat4(1));
+  }
+
+  const std::string& path() const { return path_; }
+
+  /// All of it, or the solid's node.
+  Mesh meshOf(const Solid& solid) const {
+    if (solid.node && *solid.node >= nodes_.size())
+      throw InputError(path_, "", fmt::format("a node {} for the solid {}", *solid.node, solid.name),
+                       fmt::format("{} nodes", nodes_.size()), "the file has changed since the scene was read");
+    const std::size_t first = solid.node.value_or(0), last = solid.node ? first + 1 : nodes_.size();
+    const dmat4 placed = sceneTransform(solid);
+    Mesh mesh;
+    LeftOut leftOut;
+    for (std::size_t k = first; k < last; ++k) {
+      const aiNode& node = *nodes_[k].node;
+      for (unsigned i = 0; i < node.mNumMeshes; ++i)
+        addMesh(*scene_->mMeshes[node.mMeshes[i]], placed * nodes_[k].world, mesh, leftOut);
+    }
+    finish(solid, leftOut, mesh);
+    return mesh;
+  }
+
+ private:
+  struct Node {
+    const aiNode* node;
+    dmat4 world;
+  };
+
+  void collect(const aiNode& node, const dmat4& parent) {
+    const dmat4 world = parent * fromAssimp(node.mTransformation);
+    nodes_.push_back({&node, world});
+    for (unsigned i = 0; i < node.mNumChildren; ++i) collect(*node.mChildren[i], world);
+  }
+
+  void finish(const Solid& solid, const LeftOut& leftOut, Mesh& mesh) const {
+    const std::string field = solid.node ? fmt::format("the mesh of {}", solid.name) : "";
+    const std::string place = field.empty() ? path_ : fmt::format("{}: {}", path_, field);
+    const std::size_t dropped = leftOut.degenerate + leftOut.notFinite;
+    if (mesh.triangles.empty())
+      throw InputError(place, "", "a mesh with triangles",
+                       dropped == 0
+                           ? "none"
+                           : fmt::format("{} without area and {} not finite", leftOut.degenerate, leftOut.notFinite));
+    if (dropped > 0)
+      logWarning(fmt::format("{}: {} triangles without area and {} not finite were left out of {}", place,
+                             leftOut.degenerate, leftOut.notFinite, dropped + mesh.triangles.size()));
+    if (!hasNormals(mesh)) makeNormals(mesh);
+  }
+
+  std::string path_;
+  Assimp::Importer importer_;
+  const aiScene* scene_ = nullptr;  // the importer's
+  std::vector<Node> nodes_;
+};
+
 }  // namespace
 
 Bounds Mesh::bounds() const {
@@ -151,32 +217,17 @@ Bounds Mesh::bounds() const {
   return bounds;
 }
 
-Mesh loadMesh(const Solid& solid, int frame) {
-  const std::string path = framePath(solid.file, frame);
-  checkFile(solid, path);
-  Assimp::Importer importer;
-  // What Mote does not read need not be carried along, nor split vertices.
-  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,
-                              aiComponent_TEXCOORDS | aiComponent_COLORS | aiComponent_TANGENTS_AND_BITANGENTS |
-                                  aiComponent_BONEWEIGHTS | aiComponent_ANIMATIONS | aiComponent_TEXTURES |
-                                  aiComponent_LIGHTS | aiComponent_CAMERAS);
-  const aiScene* scene = importer.ReadFile(path, aiProcess_Triangulate | aiProcess_RemoveComponent);
-  if (!scene || !scene->mRootNode)
-    throw InputError(path, "", "a mesh (OBJ, PLY, STL, glTF, GLB …)", importer.GetErrorString());
-  Mesh mesh;
-  LeftOut leftOut;
-  addNode(*scene, *scene->mRootNode, sceneTransform(solid), mesh, leftOut);
-  const std::size_t dropped = leftOut.degenerate + leftOut.notFinite;
-  if (mesh.triangles.empty())
-    throw InputError(path, "", "a mesh with triangles",
-                     dropped == 0
-                         ? "none"
-                         : fmt::format("{} without area and {} not finite", leftOut.degenerate, leftOut.notFinite));
-  if (dropped > 0)
-    logWarning(fmt::format("{}: {} triangles without area and {} not finite were left out of {}", path,
-                           leftOut.degenerate, leftOut.notFinite, dropped + mesh.triangles.size()));
-  if (!hasNormals(mesh)) makeNormals(mesh);
-  return mesh;
+Mesh loadMesh(const Solid& solid, int frame) { return std::move(loadMeshes({&solid, 1}, {&frame, 1}).front()); }
+
+std::vector<Mesh> loadMeshes(std::span<const Solid> solids, std::span<const int> frames) {
+  std::vector<Mesh> meshes;
+  std::optional<MeshFile> file;
+  for (std::size_t k = 0; k < solids.size(); ++k) {
+    const std::string path = framePath(solids[k].file, frames[k]);
+    if (!file || file->path() != path) file.emplace(solids[k], path);
+    meshes.push_back(file->meshOf(solids[k]));
+  }
+  return meshes;
 }
 
 }  // namespace mote

@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "host/core/vec.h"
@@ -22,11 +23,15 @@ struct Mesh {
   }
 };
 
-/// Reads the file of `frame` (#### in the name), with the transforms of the nodes that it stands under and then the
-/// solid's own: scale, rotate about x, y and z, translate. Polygons become triangles; lines and points are passed over.
-/// Triangles without area or with a corner that is not finite are left out, with one warning that counts them.
-/// A file without normals gets smooth ones, with its edges of more than 45° kept sharp.
+/// Reads the file of `frame` (#### in the name), all of it or the solid's node, with the transforms of the nodes that
+/// it stands under and then the solid's own: scale, rotate about x, y and z, translate. Polygons become triangles;
+/// lines and points are passed over. Triangles without area or with a corner that is not finite are left out, with one
+/// warning that counts them. A file without normals gets smooth ones, with its edges of more than 45° kept sharp.
 /// Throws InputError for a missing file (with the nearest names), a file that is no mesh, and one without triangles.
 Mesh loadMesh(const Solid& solid, int frame);
+
+/// The meshes of all of them, in their order, each of its frame. Solids that follow each other with one file, as those of
+/// an import do, have it read once.
+std::vector<Mesh> loadMeshes(std::span<const Solid> solids, std::span<const int> frames);
 
 }  // namespace mote
