@@ -94,6 +94,29 @@ void checkViews(ObjectReader& object, std::vector<ObjectReader>& keyObjects, con
     checkView(keyObjects[i], interpolatedCamera(camera, static_cast<double>(camera.keys[i].frame)));
 }
 
+/// Takes from an import's motion what the scene itself says.
+void dropOverridden(const ObjectReader& object, Camera& camera) {
+  if (object.has("keys")) camera.keys.clear();
+  for (CameraKey& key : camera.keys) {
+    if (object.has("position")) key.position.reset();
+    if (object.has("target")) key.target.reset();
+    if (object.has("up")) key.up.reset();
+  }
+  std::erase_if(camera.keys, [](const CameraKey& key) { return !key.position && !key.target && !key.up; });
+}
+
+/// An import's keys all name the same properties, so each with the camera's own is the view at its frame.
+void checkImportedViews(ObjectReader& object, Camera& camera) {
+  for (const CameraKey& key : camera.keys) {
+    Camera at = camera;
+    at.keys.clear();
+    at.position = key.position.value_or(camera.position);
+    at.target = key.target.value_or(camera.target);
+    at.up = key.up.value_or(camera.up);
+    checkView(object, at);
+  }
+}
+
 void readLens(ObjectReader& object, Camera& camera) {
   // Both within a fortnight, so that a frame number may be taken from them.
   if (object.vector("shutter", camera.shutter, between(-1e6, 1e6, "s")) && camera.shutter.x > camera.shutter.y)
@@ -105,10 +128,12 @@ void readLens(ObjectReader& object, Camera& camera) {
 
 }  // namespace
 
-void readCamera(ObjectReader& root, Camera& camera) {
+void readCamera(ObjectReader& root, Camera& camera, bool imported) {
   ObjectReader object = root.object("camera", "the camera");
   object.choice<Projection>("type", camera.projection,
                             {{"perspective", Projection::Perspective}, {"orthographic", Projection::Orthographic}});
+  if (imported) dropOverridden(object, camera);
+  const std::size_t importedKeys = camera.keys.size();
   object.vector("position", camera.position, kCoordinate);
   object.vector("target", camera.target, kCoordinate);
   object.vector("up", camera.up, kCoordinate);
@@ -121,10 +146,13 @@ void readCamera(ObjectReader& root, Camera& camera) {
   std::vector<ObjectReader> keys = object.list("keys", "a camera key");
   const bool ascending = readKeys(keys, camera);
 
-  camera.fitted = !isPlaced(object, camera);
+  camera.fitted = !imported && !isPlaced(object, camera);
   camera.fittedDepths = camera.fitted && !object.has("near") && !object.has("far");
   camera.fittedHeight = camera.fitted && camera.projection == Projection::Orthographic && !object.has("height");
-  if (ascending) checkViews(object, keys, camera);
+  if (importedKeys > 0)
+    checkImportedViews(object, camera);
+  else if (ascending)
+    checkViews(object, keys, camera);
   if (!camera.fittedDepths && camera.near >= camera.far)
     object.problem(object.has("far") ? "far" : "near", "near < far",
                    fmt::format("near {} and far {}", camera.near, camera.far));

@@ -13,24 +13,6 @@ namespace {
 
 using Kind = JsonNode::Kind;
 
-std::string rangeText(std::string_view what, const Range& range) {
-  std::string text(what);
-  const bool low = std::isfinite(range.min), high = std::isfinite(range.max);
-  if (low && high && !range.minOpen && !range.maxOpen) {
-    text += fmt::format(" from {} to {}", range.min, range.max);
-  } else {
-    if (low) text += fmt::format(" {} {}", range.minOpen ? ">" : ">=", range.min);
-    if (high) text += fmt::format("{} {} {}", low ? " and" : "", range.maxOpen ? "<" : "<=", range.max);
-  }
-  if (!range.unit.empty()) text += fmt::format(" [{}]", range.unit);
-  return text;
-}
-
-bool inside(double value, const Range& range) {
-  return (range.minOpen ? value > range.min : value >= range.min) &&
-         (range.maxOpen ? value < range.max : value <= range.max);
-}
-
 /// "a, b or c", each in quotes.
 std::string wordList(std::span<const std::string_view> words) {
   std::string text;
@@ -75,6 +57,24 @@ std::size_t editDistance(std::string_view a, std::string_view b) {
 }
 
 }  // namespace
+
+std::string rangeText(std::string_view what, const Range& range) {
+  std::string text(what);
+  const bool low = std::isfinite(range.min), high = std::isfinite(range.max);
+  if (low && high && !range.minOpen && !range.maxOpen) {
+    text += fmt::format(" from {} to {}", range.min, range.max);
+  } else {
+    if (low) text += fmt::format(" {} {}", range.minOpen ? ">" : ">=", range.min);
+    if (high) text += fmt::format("{} {} {}", low ? " and" : "", range.maxOpen ? "<" : "<=", range.max);
+  }
+  if (!range.unit.empty()) text += fmt::format(" [{}]", range.unit);
+  return text;
+}
+
+bool isInside(double value, const Range& range) {
+  return (range.minOpen ? value > range.min : value >= range.min) &&
+         (range.maxOpen ? value < range.max : value <= range.max);
+}
 
 std::string_view nearestWord(std::string_view word, std::span<const std::string_view> words) {
   constexpr std::size_t kLongEnough = 64;  // no key is longer; bounds the work for a hostile file
@@ -124,13 +124,13 @@ bool ObjectReader::numberAt(const std::string& pointer, const JsonNode& node, fl
   roundedRange.min = static_cast<double>(static_cast<float>(range.min));
   roundedRange.max = static_cast<double>(static_cast<float>(range.max));
   // A number may leave an open range by rounding: 1e-60 becomes 0, 179.999999999 becomes 180. And 1e60 is no float.
-  const bool good = node.kind == Kind::Number && std::isfinite(rounded) && inside(node.number, range) &&
-                    inside(static_cast<double>(rounded), roundedRange);
+  const bool good = node.kind == Kind::Number && std::isfinite(rounded) && isInside(node.number, range) &&
+                    isInside(static_cast<double>(rounded), roundedRange);
   if (good) {
     value = rounded;
   } else {
-    const bool tooLarge = node.kind == Kind::Number && !std::isfinite(rounded) && inside(node.number, range);
-    const bool rounds = node.kind == Kind::Number && std::isfinite(rounded) && inside(node.number, range);
+    const bool tooLarge = node.kind == Kind::Number && !std::isfinite(rounded) && isInside(node.number, range);
+    const bool rounds = node.kind == Kind::Number && std::isfinite(rounded) && isInside(node.number, range);
     problemAt(node.place, pointer, rangeText("a number", range), node.shown(),
               tooLarge ? "numbers are single precision, up to 3.4e38"
               : rounds ? fmt::format("numbers are single precision: this one is {}", rounded)

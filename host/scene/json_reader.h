@@ -31,6 +31,10 @@ constexpr Range between(double min, double max, std::string_view unit = {}) {
   return {.min = min, .max = max, .unit = unit};
 }
 
+bool isInside(double value, const Range& range);
+/// "a number > 0 and <= 1 [unit]", where `what` is "a number".
+std::string rangeText(std::string_view what, const Range& range);
+
 /// A word of the file and what it stands for.
 template <class E>
 struct Choice {
@@ -112,6 +116,9 @@ class ObjectReader {
   void problem(std::string_view key, std::string_view expected, std::string_view got, std::string_view hint = {});
   /// Notes a problem for each key that nobody asked for. To be called last.
   void finish();
+
+  /// Something is wrong in the document so far.
+  bool hasProblems() const { return !reading_->unknownKey_.empty() || !reading_->firstProblem_.empty(); }
 
   const std::string& pointer() const { return pointer_; }
 

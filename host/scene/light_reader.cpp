@@ -63,13 +63,12 @@ void checkKeysOfType(ObjectReader& object, LightType type) {
                    spot ? "a spot light has an intensity" : "a point light has an intensity");
 }
 
-LightSource readLight(ObjectReader& object, std::size_t index) {
-  LightSource light;
-  light.name = fmt::format("light{}", index);
-  readName(object, light.name, "it becomes the channel Transmittance_<name>");
+/// `light`: of that name already, or one of defaults; it is what absent keys leave. Another type starts anew.
+void readLight(ObjectReader& object, LightSource& light) {
+  LightType type = light.type;
   object.choice<LightType>(
-      "type", light.type,
-      {{"point", LightType::Point}, {"spot", LightType::Spot}, {"directional", LightType::Directional}});
+      "type", type, {{"point", LightType::Point}, {"spot", LightType::Spot}, {"directional", LightType::Directional}});
+  if (type != light.type) light = {.name = light.name, .type = type};
   object.vector("position", light.position, kCoordinate);
   readDirection(object, light.direction);
   readTarget(object, light);
@@ -82,22 +81,32 @@ LightSource readLight(ObjectReader& object, std::size_t index) {
   object.boolean("casts_shadows", light.castsShadows);
   checkKeysOfType(object, light.type);
   object.finish();
-  return light;
 }
 
 }  // namespace
 
 void readLights(ObjectReader& root, Scene& scene) {
-  scene.defaultLights = !root.has("lights");
+  scene.defaultLights = !root.has("lights") && scene.lights.empty();
   std::vector<ObjectReader> objects = root.list("lights", "a light");
+  std::vector<std::string> given;
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    LightSource light = readLight(objects[i], i);
-    const auto earlier = std::find_if(scene.lights.begin(), scene.lights.end(),
-                                      [&](const LightSource& other) { return other.name == light.name; });
-    if (earlier != scene.lights.end())
-      objects[i].problem("name", "a name that no other light has", quotedForMessage(light.name),
-                         fmt::format("/lights/{} has it", earlier - scene.lights.begin()));
-    scene.lights.push_back(std::move(light));
+    std::string name = fmt::format("light{}", i);
+    readName(objects[i], name, "it becomes the channel Transmittance_<name>");
+    const auto known = findNamed(scene.lights, name);
+    const auto before = std::find(given.begin(), given.end(), name);
+    // A light that is called as one of the import's changes it; that must be meant, so it must be written.
+    const bool changes = known != scene.lights.end() && before == given.end() && objects[i].has("name");
+    if (known != scene.lights.end() && !changes)
+      objects[i].problem("name", "a name that no other light has", quotedForMessage(name),
+                         before != given.end() ? fmt::format("/lights/{} has it", before - given.begin())
+                                               : "a light of the import has it");
+    LightSource light = changes ? *known : LightSource{.name = name};
+    readLight(objects[i], light);
+    if (changes)
+      *known = std::move(light);
+    else
+      scene.lights.push_back(std::move(light));
+    given.push_back(std::move(name));
   }
 }
 

@@ -10,9 +10,6 @@
 namespace mote {
 namespace {
 
-// "Transmittance_" + name must fit the 31 characters of a PRT channel name.
-constexpr std::size_t kMaxName = 17;
-
 bool isIdentifier(std::string_view name) {
   const auto letter = [](char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '_'; };
   const auto digit = [](char c) { return c >= '0' && c <= '9'; };
@@ -39,10 +36,10 @@ bool readPath(ObjectReader& object, std::string_view key, std::string& path, con
 
 void readName(ObjectReader& object, std::string& name, std::string_view hint) {
   if (!object.text("name", name)) return;
-  if (!isIdentifier(name) || name.size() > kMaxName)
-    object.problem("name",
-                   fmt::format("a name of 1 to {} letters, digits and _ that does not begin with a digit", kMaxName),
-                   quotedForMessage(name), hint);
+  if (!isIdentifier(name) || name.size() > kMaxNameLength)
+    object.problem(
+        "name", fmt::format("a name of 1 to {} letters, digits and _ that does not begin with a digit", kMaxNameLength),
+        quotedForMessage(name), hint);
 }
 
 void readBackend(ObjectReader& object, Backend& backend) {

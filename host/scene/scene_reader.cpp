@@ -40,15 +40,16 @@ Scene readWhole(ObjectReader& root, const std::string& path) {
   scene.path = path;
   const std::filesystem::path folder = folderOf(scene);
   readFormatVersion(root);
+  readFrames(root, scene.frames);
+  const bool camera = readImport(root, scene);
   readParticles(root, scene);
   readMedium(root, scene.medium);
   readLights(root, scene);
   readLighting(root, scene.lighting);
   readSolids(root, scene);
-  readCamera(root, scene.camera);
+  readCamera(root, scene.camera, camera);
   readView(root, folder, scene.view);
   readOutput(root, folder, scene.output);
-  readFrames(root, scene.frames);
   readOrigin(root, scene.origin);
   root.finish();
   return scene;
