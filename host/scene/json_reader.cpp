@@ -140,7 +140,7 @@ bool ObjectReader::numberAt(const std::string& pointer, const JsonNode& node, fl
 }
 
 bool ObjectReader::numberAt(const std::string& pointer, const JsonNode& node, double& value, const Range& range) {
-  const bool good = node.kind == Kind::Number && std::isfinite(node.number) && inside(node.number, range);
+  const bool good = node.kind == Kind::Number && std::isfinite(node.number) && isInside(node.number, range);
   if (good) {
     value = node.number;
   } else {
