@@ -104,6 +104,10 @@ std::string wholeShot() {
 
 // --- what is taken ------------------------------------------------------------------------------------------------
 
+std::vector<Mesh> meshesOf(const Scene& scene) {
+  return loadMeshes(scene.solids, std::vector<int>(scene.solids.size(), 1));
+}
+
 TEST(GltfImport, PlacesAPerspectiveCameraByItsNodesWithoutTheirScale) {
   const Shot shot(wholeShot());
   const Camera camera = shot.scene().camera;
@@ -124,8 +128,8 @@ TEST(GltfImport, ReadsAnOrthographicCamera) {
       Shot(gltf(kLens + R"("scenes":[{"nodes":[0]}],"nodes":[{"camera":1,"translation":[0,0,7]}])")).scene().camera;
   EXPECT_EQ(camera.projection, Projection::Orthographic);
   EXPECT_EQ(camera.height, 4);  // ymag is half of it
-  EXPECT_EQ(camera.position, vec3(0, 0, 7));
-  EXPECT_EQ(camera.target, vec3(0));
+  EXPECT_EQ(camera.position, dvec3(0, 0, 7));
+  EXPECT_EQ(camera.target, dvec3(0));
   EXPECT_EQ(camera.near, 0.5f);
   EXPECT_EQ(camera.far, 32);
 }
@@ -143,13 +147,13 @@ TEST(GltfImport, TakesLightsOfAllKindsInRadiometricUnits) {
   const LightSource &point = scene.lights[0], &spot = scene.lights[1], &sun = scene.lights[2];
   EXPECT_EQ(point.name, "Key_Light");
   EXPECT_EQ(point.type, LightType::Point);
-  EXPECT_EQ(point.position, vec3(1, 2, 3));
+  EXPECT_EQ(point.position, dvec3(1, 2, 3));
   EXPECT_EQ(point.color, vec3(1, 0.5f, 0.25f));
   EXPECT_EQ(point.strength, 2);  // 1366 cd
   EXPECT_EQ(point.decay, 2);
   EXPECT_EQ(spot.name, "bulb");  // the node has no name, the light itself has
   EXPECT_EQ(spot.type, LightType::Spot);
-  EXPECT_EQ(spot.position, vec3(0, 4, 0));
+  EXPECT_EQ(spot.position, dvec3(0, 4, 0));
   expectNear(spot.direction, {0, -1, 0});
   EXPECT_EQ(spot.strength, 1);
   EXPECT_NEAR(static_cast<double>(spot.innerAngle), 0.25 * 180 / kPi, 1e-5);
@@ -168,7 +172,7 @@ TEST(GltfImport, PutsEachMeshWhereItsNodesDo) {
   EXPECT_EQ(scene.solids[1].name, "Box_001_2");
   const std::vector<Mesh> meshes = [&] {
     const Shot shot(wholeShot());
-    return loadMeshes(shot.scene().solids, 1);
+    return meshesOf(shot.scene());
   }();
   ASSERT_EQ(meshes.size(), 2u);
   for (const Mesh& mesh : meshes) EXPECT_EQ(mesh.triangles.size(), 12u);
@@ -189,7 +193,7 @@ TEST(GltfImport, FindsMeshesUnderASingleRootAndAmongNodesOutsideTheScene) {
   ASSERT_EQ(scene.solids.size(), 2u);
   EXPECT_EQ(scene.solids[0].name, "a");
   EXPECT_EQ(scene.solids[1].name, "b");
-  const std::vector<Mesh> meshes = loadMeshes(scene.solids, 1);
+  const std::vector<Mesh> meshes = meshesOf(scene);
   EXPECT_EQ(meshes[0].bounds().lo, vec3(4, -1, -1));
   EXPECT_EQ(meshes[1].bounds().lo, vec3(-1, -1, 2));
 }
@@ -226,9 +230,9 @@ TEST(GltfImport, TakesTheFirstCameraOrTheNamedOne) {
   {
     const WarningsKept kept(warnings);
     EXPECT_EQ(shot.scene().camera.projection, Projection::Orthographic);
-    EXPECT_EQ(shot.scene(R"(,"camera":"Top")").camera.position, vec3(0, 9, 0));
-    EXPECT_EQ(shot.scene(R"(,"camera":"lens")").camera.position, vec3(0, 9, 0));  // the camera's own name
-    EXPECT_EQ(shot.scene(R"(,"camera":"Old")").camera.position, vec3(0, 0, 2));   // as Blender called it
+    EXPECT_EQ(shot.scene(R"(,"camera":"Top")").camera.position, dvec3(0, 9, 0));
+    EXPECT_EQ(shot.scene(R"(,"camera":"lens")").camera.position, dvec3(0, 9, 0));  // the camera's own name
+    EXPECT_EQ(shot.scene(R"(,"camera":"Old")").camera.position, dvec3(0, 0, 2));   // as Blender called it
   }
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_TRUE(contains(warnings[0], R"(of its 3 cameras ("Side", "Top", "Old") the first is taken)"));
@@ -245,9 +249,9 @@ TEST(GltfImport, ReadsTheDuckOfTheSharedData) {
   expectNear(scene.camera.position, {4.001130f, 4.632640f, -4.310780f});  // the root's scale is 0.01
   EXPECT_NEAR(static_cast<double>(scene.camera.fov), 37.8492, 1e-4);
   // It looks at the duck: the line of sight passes its middle within half its height.
-  const vec3 middle(0.134f, 0.870f, -0.037f), view = viewOf(scene.camera);
-  EXPECT_LT(glm::length(glm::cross(middle - scene.camera.position, view)), 0.77f);
-  EXPECT_GT(glm::dot(middle - scene.camera.position, view), 0);
+  const vec3 toMiddle(dvec3(0.134, 0.870, -0.037) - scene.camera.position), view = viewOf(scene.camera);
+  EXPECT_LT(glm::length(glm::cross(toMiddle, view)), 0.77f);
+  EXPECT_GT(glm::dot(toMiddle, view), 0);
   EXPECT_TRUE(scene.defaultLights);  // it brings none
   ASSERT_EQ(scene.solids.size(), 1u);
   const Mesh mesh = loadMesh(scene.solids[0], 1);
@@ -261,7 +265,7 @@ TEST(GltfImport, KeysOfTheScenesCameraOverrideTheImports) {
   const Shot shot(wholeShot());
   const Camera before = shot.scene().camera, camera = shot.scene("", R"(,"camera":{"fov":20,"target":[0,1,0]})").camera;
   EXPECT_EQ(camera.fov, 20);
-  EXPECT_EQ(camera.target, vec3(0, 1, 0));
+  EXPECT_EQ(camera.target, dvec3(0, 1, 0));
   EXPECT_EQ(camera.position, before.position);
   EXPECT_EQ(camera.near, before.near);
   const Camera parallel = shot.scene("", R"(,"camera":{"type":"orthographic","height":3})").camera;
@@ -368,12 +372,12 @@ TEST(GltfImport, MakesAKeyOfEachFrameOfAMovingCamera) {
   for (int frame = 1; frame <= 5; ++frame) {
     const CameraKey& key = camera.keys[static_cast<std::size_t>(frame - 1)];
     EXPECT_EQ(key.frame, frame);
-    EXPECT_EQ(*key.position, vec3(frame * frame, 0, 8));
+    EXPECT_EQ(*key.position, dvec3(frame * frame, 0, 8));
     expectNear(glm::normalize(*key.target - *key.position), {0, 0, -1});
     expectNear(*key.up, {0, 1, 0});
     EXPECT_FALSE(key.fov || key.height || key.focusDistance);
   }
-  EXPECT_EQ(camera.position, vec3(1, 0, 8));
+  EXPECT_EQ(camera.position, dvec3(1, 0, 8));
   EXPECT_FALSE(camera.fitted);
   // Time 0 may be at another frame, and the scene may run faster: half frames between the file's are interpolated.
   EXPECT_EQ(shot.scene(R"(,"frame":100)").camera.keys.front().frame, 101);
@@ -417,8 +421,8 @@ TEST(GltfImport, MovesACameraWithTheNodeThatItStandsUnder) {
                          R"([{"children":[1],"scale":[2,2,2]},{"camera":0,"translation":[0,0,3]}])"));
   const std::vector<CameraKey> keys = shot.scene().camera.keys;
   ASSERT_EQ(keys.size(), 2u);
-  EXPECT_EQ(*keys[0].position, vec3(0, 0, 6));
-  EXPECT_EQ(*keys[1].position, vec3(4, 0, 6));
+  EXPECT_EQ(*keys[0].position, dvec3(0, 0, 6));
+  EXPECT_EQ(*keys[1].position, dvec3(4, 0, 6));
 }
 
 TEST(GltfImport, KeysOfTheSceneTakeThePlaceOfItsMotion) {
@@ -426,12 +430,12 @@ TEST(GltfImport, KeysOfTheSceneTakeThePlaceOfItsMotion) {
   const Camera fixed = shot.scene("", R"(,"camera":{"position":[0,5,1],"fov":30})").camera;
   ASSERT_EQ(fixed.keys.size(), 3u);  // it still looks where the motion looks
   for (const CameraKey& key : fixed.keys) EXPECT_TRUE(!key.position && key.target && key.up);
-  EXPECT_EQ(cameraAt(fixed, 1).position, vec3(0, 5, 1));
+  EXPECT_EQ(cameraAt(fixed, 1).position, dvec3(0, 5, 1));
   EXPECT_EQ(fixed.fov, 30);
   EXPECT_TRUE(shot.scene("", R"(,"camera":{"position":[0,5,0],"target":[0,0,0],"up":[0,0,1]})").camera.keys.empty());
   const Camera keyed = shot.scene("", R"(,"camera":{"keys":[{"frame":7,"fov":20}]})").camera;
   ASSERT_EQ(keyed.keys.size(), 1u);
-  EXPECT_EQ(keyed.position, vec3(0, 0, 8));
+  EXPECT_EQ(keyed.position, dvec3(0, 0, 8));
   // A place from where the motion's target is straight up.
   EXPECT_TRUE(
       contains(shot.error("", R"(,"camera":{"position":[0,-5,0],"target":[0,5,0]})"), "expected an up direction"));
@@ -448,12 +452,12 @@ TEST(GltfImport, ReadsBuffersInTextAndBesideTheFile) {
                            fmt::format(R"("byteLength":{},"uri":"{}"}}],"bufferViews")", bytes.size(), uri));
   };
   const Shot inText(withUri("data:application/octet-stream;base64," + test::base64(bytes)), "shot.gltf");
-  EXPECT_EQ(inText.scene().camera.keys.at(1).position, vec3(4, 0, 8));
+  EXPECT_EQ(inText.scene().camera.keys.at(1).position, dvec3(4, 0, 8));
   EXPECT_EQ(inText.scene().imported.size(), 1u);
   const Shot beside(withUri("my%20shot.bin"), "shot.gltf");
   EXPECT_TRUE(contains(beside.error(), "shot.gltf: /buffers/0/uri: expected a file beside this one"));
   test::writeBytes(beside.file("my shot.bin"), bytes);
-  EXPECT_EQ(beside.scene().camera.keys.at(1).position, vec3(4, 0, 8));
+  EXPECT_EQ(beside.scene().camera.keys.at(1).position, dvec3(4, 0, 8));
   EXPECT_EQ(beside.scene().imported, (std::vector{beside.file("shot.gltf"), beside.file("my shot.bin")}));
   test::writeBytes(beside.file("my shot.bin"), bytes.substr(0, 170));
   EXPECT_TRUE(contains(beside.error(), "/buffers/0: expected 8 bytes from byte 168 on, got a buffer of 170"));
@@ -690,7 +694,7 @@ TEST(GltfImport, SurvivesEveryFlippedBit) {
       EXPECT_LE(scene.camera.keys.size(), 100'001u);
       // Assimp takes most of the time, so it gets one flipped bit of every byte; what it refuses it leaks in part.
       const test::LeakOnPurpose assimp;
-      if (bit % 8 == bit / 8 % 8) loadMeshes(scene.solids, 1);
+      if (bit % 8 == bit / 8 % 8) meshesOf(scene);
     } catch (const InputError&) {
       ++refused;
     }
