@@ -136,6 +136,7 @@ TEST_F(MoteRender, FramesThatLoadAheadAreThoseRenderedAlone) {
       test::mote({"generate", "plume", "--count", "3000", "--frames", "1-3", "-o", folder_.file("p.#.prt")}).exitCode,
       0);
   writeBytes(folder_.file("p.2.prt"), readBytes(folder_.file("p.2.prt")) + "behind the end");
+  writeBytes(folder_.file("p.4.prt"), "");  // its file is there, so nothing is said before its turn
   writeBytes(scene_, R"({"particles": [{"file": "p.#.prt"}], "medium": {"density_scale": 0.001},
     "camera": {"position": [0, 1, 6], "target": [0, 1, 0]}, "lights": [{"name": "key", "position": [2, 3, 1]}],
     "output": {"size": [48, 32]}})");
