@@ -374,26 +374,25 @@ TEST(Hdf5Reader, RefusesTruncationAtEveryByte) {
   }
 }
 
-TEST(Hdf5Reader, SurvivesEveryFlippedBit) { expectEveryFlippedBitSurvived(two(true), 10000); }
+TEST(Hdf5Reader, SurvivesAFlippedBitInEveryByte) { expectEveryFlippedBitSurvived(two(true), 10000, 9); }
 
 TEST(Hdf5Reader, SurvivesDamageOfEveryByteOfOldStructures) {
-  // They have no checksums, but are long, and most of them is room for more: one bit of each byte, and all of it.
+  // They have no checksums, but are long, and most of them is room for more: one bit of each byte.
   const std::string whole = two(false);
   std::size_t refused = 0;
   std::vector<std::string> warnings;
   const WarningsKept kept(warnings);
-  for (std::size_t k = 0; k < whole.size(); ++k)
-    for (const int mask : {1 << k % 8, 255}) {
-      std::string bytes = whole;
-      bytes[k] = static_cast<char>(bytes[k] ^ mask);
-      try {
-        const OpenedFile opened(bytes);
-        EXPECT_LE(opened.file->count(), 10000u) << k;
-        opened.readAll();
-      } catch (const InputError&) {
-        ++refused;
-      }
+  for (std::size_t k = 0; k < whole.size(); ++k) {
+    std::string bytes = whole;
+    bytes[k] = static_cast<char>(bytes[k] ^ 1 << k % 8);
+    try {
+      const OpenedFile opened(bytes);
+      EXPECT_LE(opened.file->count(), 10000u) << k;
+      opened.readAll();
+    } catch (const InputError&) {
+      ++refused;
     }
+  }
   EXPECT_GT(refused, 0u);
 }
 

@@ -47,12 +47,12 @@ inline void expectFileRefused(const std::string& bytes, const std::vector<std::s
 }
 
 /// Opens and reads the file with each of its bits flipped. It must be refused, as it is at least once, or read, with no
-/// more than `mostParticles`.
-inline void expectEveryFlippedBitSurvived(const std::string& whole, std::uint64_t mostParticles) {
+/// more than `mostParticles`. `step`: 9 takes another bit of each byte, but for every ninth: of formats that take long.
+inline void expectEveryFlippedBitSurvived(const std::string& whole, std::uint64_t mostParticles, std::size_t step = 1) {
   std::vector<std::string> warnings;
   const WarningsKept kept(warnings);
   std::size_t refused = 0;
-  for (std::size_t bit = 0; bit < 8 * whole.size(); ++bit) {
+  for (std::size_t bit = 0; bit < 8 * whole.size(); bit += step) {
     std::string bytes = whole;
     bytes[bit / 8] = static_cast<char>(bytes[bit / 8] ^ 1 << bit % 8);
     try {
