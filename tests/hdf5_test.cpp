@@ -12,12 +12,6 @@
 #include <zlib.h>
 #endif
 
-#if defined(__SANITIZE_ADDRESS__) && defined(MOTE_HAS_HDF5)
-/// libhdf5 forgets what it had allocated where it finds damage; that is not ours to free.
-extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:libhdf5"; }
-#endif
-
 namespace mote {
 namespace {
 
@@ -367,33 +361,53 @@ std::string two(bool newest) {
   return made(fill, newest);
 }
 
+// A file is opened in a process of its own, which takes a while: hence every byte of new structures, which are short,
+// but of old ones, most of which are room for more, every 16th.
 TEST(Hdf5Reader, RefusesTruncationAtEveryByte) {
   for (const bool newest : {false, true}) {
     const std::string whole = two(newest);
-    for (std::size_t size = 0; size < whole.size(); ++size) expectFileRefused(whole.substr(0, size), {"particles"});
+    for (std::size_t size = 0; size < whole.size(); size += newest ? 1 : 16)
+      expectFileRefused(whole.substr(0, size), {"particles"});
+  }
+}
+
+/// Opens and reads the file with a byte changed by each of the masks. It must be refused or read.
+void expectDamageSurvived(const std::string& whole, std::size_t at, std::initializer_list<int> masks) {
+  for (const int mask : masks) {
+    std::string bytes = whole;
+    bytes[at] = static_cast<char>(bytes[at] ^ mask);
+    try {
+      const OpenedFile opened(bytes);
+      EXPECT_LE(opened.file->count(), 10000u) << at;
+      opened.readAll();
+    } catch (const InputError&) {
+      continue;
+    }
   }
 }
 
 TEST(Hdf5Reader, SurvivesAFlippedBitInEveryByte) { expectEveryFlippedBitSurvived(two(true), 10000, 9); }
 
-TEST(Hdf5Reader, SurvivesDamageOfEveryByteOfOldStructures) {
-  // They have no checksums, but are long, and most of them is room for more: one bit of each byte.
+TEST(Hdf5Reader, SurvivesDamageOfOldStructures) {
+  // They have no checksums: every byte that says something, and every 16th that does not.
   const std::string whole = two(false);
-  std::size_t refused = 0;
   std::vector<std::string> warnings;
   const WarningsKept kept(warnings);
-  for (std::size_t k = 0; k < whole.size(); ++k) {
-    std::string bytes = whole;
-    bytes[k] = static_cast<char>(bytes[k] ^ 1 << k % 8);
-    try {
-      const OpenedFile opened(bytes);
-      EXPECT_LE(opened.file->count(), 10000u) << k;
-      opened.readAll();
-    } catch (const InputError&) {
-      ++refused;
-    }
-  }
-  EXPECT_GT(refused, 0u);
+  for (std::size_t k = 0; k < whole.size(); ++k)
+    if (whole[k] != 0)
+      expectDamageSurvived(whole, k, {1 << k % 8, 255});
+    else if (k % 16 == 0)
+      expectDamageSurvived(whole, k, {255});
+}
+
+/// A file whose chunk has no rows makes libhdf5 1.10 divide by zero.
+TEST(Hdf5Reader, RefusesWhatMakesItsLibraryCrash) {
+  std::string whole = two(false);
+  // The chunk's dimensions in the layout's message: rank 3, address, then 2 × 3 × 4 bytes.
+  const std::size_t chunk = whole.find(std::string("\x02\0\0\0\x03\0\0\0\x04\0\0\0", 12));
+  ASSERT_NE(chunk, std::string::npos);
+  whole[chunk] = 0;
+  expectFileRefused(whole, {"libhdf5", "some that make it crash", "the file is damaged"});
 }
 
 TEST(Hdf5Reader, RefusesArraysThatTheFileCannotHold) {
@@ -433,19 +447,16 @@ TEST(Hdf5Reader, RefusesAChunkThatUnpacksToMoreThanItsSize) {
                     {"Coordinates, row 0 on", "a chunk that zlib cannot unpack to its size"});
 }
 
-/// Made before the first file is read: from then on this process has no links into other files.
-const std::string kLinked = made([](const Maker& maker) {
-  H5Lcreate_external("other.hdf5", "/Coordinates", maker.file(), "Coordinates", H5P_DEFAULT, H5P_DEFAULT);
-  H5Lcreate_soft("/Coordinates", maker.file(), "position", H5P_DEFAULT, H5P_DEFAULT);
-  H5Lcreate_soft("/loop", maker.file(), "loop", H5P_DEFAULT, H5P_DEFAULT);
-});
-
 TEST(Hdf5Reader, FollowsNoLinkIntoOtherFiles) {
   const TempFolder folder;
   writeBytes(folder.file("other.hdf5"), made([](const Maker& maker) {
                maker.array<float>("Coordinates", {2, 3}, {1, 2, 3, 4, 5, 6});
              }));
-  writeBytes(folder.file("linked.hdf5"), kLinked);
+  writeBytes(folder.file("linked.hdf5"), made([](const Maker& maker) {
+               H5Lcreate_external("other.hdf5", "/Coordinates", maker.file(), "Coordinates", H5P_DEFAULT, H5P_DEFAULT);
+               H5Lcreate_soft("/Coordinates", maker.file(), "position", H5P_DEFAULT, H5P_DEFAULT);
+               H5Lcreate_soft("/loop", maker.file(), "loop", H5P_DEFAULT, H5P_DEFAULT);
+             }));
   EXPECT_EQ(openParticleFile(folder.file("other.hdf5"))->count(), 2u);
   EXPECT_THROW(openParticleFile(folder.file("linked.hdf5")), InputError);
   writeBytes(folder.file("raw"), rawNumbers<float>({1, 2, 3, 4, 5, 6}));

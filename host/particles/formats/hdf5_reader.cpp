@@ -29,6 +29,7 @@ constexpr std::string_view kPositions[] = {"Coordinates", "coordinates", "Positi
                                            "positions",   "pos",         "P",        "points"};
 /// Support radius ÷ smoothing length of SWIFT's default kernel in three dimensions (Dehnen & Aly 2012, table 1).
 constexpr double kCubicSplineGamma = 1.825742;
+constexpr std::string_view kKernelGamma = "Kernel gamma";
 constexpr std::string_view kSmoothing[] = {"SmoothingLengths", "SmoothingLength"};
 
 const Hdf5Array* find(const std::vector<Hdf5Array>& arrays, std::string_view name) {
@@ -72,20 +73,25 @@ bool beginsAsHdf5(std::span<const std::byte> start) {
 
 Hdf5Reader::Hdf5Reader(std::string path) : ParticleFile(std::move(path)) {
   const Hdf5File file(path_);
-  const std::vector<std::string> groups = file.groups();
-  for (const char* group : {"Header", "Units", "Cosmology", "Parameters"})
-    for (Metadata& entry : file.attributes(group))
-      if (!meta("", entry.name) && (std::string_view(group) != "Parameters" || entry.name.starts_with("Unit")))
-        metadata_.push_back(std::move(entry));
-  const bool snapshot =
-      std::any_of(groups.begin(), groups.end(), [](const std::string& g) { return g.starts_with(kTypes); });
+  for (const std::string_view name : {"Header", "Units", "Cosmology", "Parameters", "HydroScheme"}) {
+    const Hdf5Group* group = file.group(std::string(name));
+    if (!group) continue;
+    for (const Metadata& entry : group->attributes) {
+      const bool wanted = name == "Parameters"    ? entry.name.starts_with("Unit")
+                          : name == "HydroScheme" ? entry.name == kKernelGamma
+                                                  : true;
+      if (wanted && !meta("", entry.name)) metadata_.push_back(entry);
+    }
+  }
+  const bool snapshot = std::any_of(file.groups().begin(), file.groups().end(),
+                                    [](const Hdf5Group& g) { return g.name.starts_with(kTypes); });
   if (snapshot || metaNumber("NumFilesPerSnapshot", 0) > 1)
     openSnapshot(file);
   else
-    openPlain(file, groups);
+    openPlain(file);
 }
 
-double Hdf5Reader::metaNumber(const std::string& name, std::size_t index) const {
+double Hdf5Reader::metaNumber(std::string_view name, std::size_t index) const {
   const Metadata* entry = meta("", name);
   if (!entry || entry->type == kMetadataText) return 0;
   return withNumberType(static_cast<NumberType>(entry->type), [&]<class T>(T number) {
@@ -129,10 +135,15 @@ std::vector<std::string> Hdf5Reader::partPaths() const {
 }
 
 void Hdf5Reader::openSnapshot(const Hdf5File& first) {
-  for (std::string& path : partPaths()) parts_.push_back({std::move(path), {}});
-  chooseGroup();
-  for (Part& part : parts_)
-    part.arrays = part.path == path_ ? first.arrays(group_) : Hdf5File(part.path).arrays(group_);
+  std::vector<std::vector<Hdf5Group>> groups;  // of each file
+  for (std::string& path : partPaths()) {
+    groups.push_back(path == path_ ? first.groups() : Hdf5File(path).groups());
+    parts_.push_back({std::move(path), {}});
+  }
+  chooseGroup(groups);
+  for (std::size_t k = 0; k < parts_.size(); ++k)
+    for (const Hdf5Group& group : groups[k])
+      if (group.name == group_) parts_[k].arrays = group.arrays;
   format_ = fmt::format("HDF5{}, {}{}", isOfSwift(*this) ? " of SWIFT" : "", group_,
                         parts_.size() > 1 ? fmt::format(" in {} files", parts_.size()) : "");
   addArrays("Coordinates");
@@ -141,16 +152,15 @@ void Hdf5Reader::openSnapshot(const Hdf5File& first) {
 }
 
 /// Gas, or else the only type of particles that there is.
-void Hdf5Reader::chooseGroup() {
+void Hdf5Reader::chooseGroup(std::span<const std::vector<Hdf5Group>> files) {
   std::vector<std::pair<std::string, std::uint64_t>> types;
-  for (const Part& part : parts_) {
-    const Hdf5File file(part.path);
-    for (const std::string& group : file.groups()) {
-      if (!group.starts_with(kTypes) || !isDigits(group.substr(kTypes.size()))) continue;
-      const std::uint64_t rows = rowsOf(file.arrays(group), "Coordinates");
-      const auto known = std::find_if(types.begin(), types.end(), [&](const auto& t) { return t.first == group; });
+  for (const std::vector<Hdf5Group>& groups : files) {
+    for (const Hdf5Group& group : groups) {
+      if (!group.name.starts_with(kTypes) || !isDigits(group.name.substr(kTypes.size()))) continue;
+      const std::uint64_t rows = rowsOf(group.arrays, "Coordinates");
+      const auto known = std::find_if(types.begin(), types.end(), [&](const auto& t) { return t.first == group.name; });
       if (known == types.end())
-        types.emplace_back(group, rows);
+        types.emplace_back(group.name, rows);
       else
         known->second += rows;
     }
@@ -231,13 +241,10 @@ void Hdf5Reader::addRadius() {
   for (const std::string_view name : kSmoothing) {
     const Channel* smoothing = channel(name);
     if (!smoothing || smoothing->arity != 1) continue;
-    double gamma = isOfSwift(*this) ? 0 : 1;
-    for (const Metadata& entry : Hdf5File(path_).attributes("HydroScheme"))
-      if (entry.name == "Kernel gamma") {
-        metadata_.push_back(entry);
-        gamma = metaNumber(entry.name, 0);
-      }
-    if (gamma == 0) {
+    double gamma = 1;
+    if (meta("", kKernelGamma)) {
+      gamma = metaNumber(kKernelGamma, 0);
+    } else if (isOfSwift(*this)) {
       gamma = kCubicSplineGamma;
       logWarning(fmt::format(
           "{}: HydroScheme has no 'Kernel gamma': radii are {} smoothing lengths, as of a cubic spline", path_, gamma));
@@ -256,8 +263,8 @@ void Hdf5Reader::addRadius() {
 
 // ---- plain files ----
 
-void Hdf5Reader::openPlain(const Hdf5File& file, const std::vector<std::string>& groups) {
-  parts_.push_back({path_, file.arrays("")});
+void Hdf5Reader::openPlain(const Hdf5File& file) {
+  parts_.push_back({path_, file.groups()[0].arrays});
   format_ = "HDF5";
   const std::vector<Hdf5Array>& arrays = parts_[0].arrays;
   const Hdf5Array* position = nullptr;
@@ -275,7 +282,8 @@ void Hdf5Reader::openPlain(const Hdf5File& file, const std::vector<std::string>&
   }
   if (!position) {
     std::string names;
-    for (const std::string& group : groups) names += (names.empty() ? "" : ", ") + group;
+    for (const Hdf5Group& group : std::span(file.groups()).subspan(1))
+      names += (names.empty() ? "" : ", ") + group.name;
     throw InputError(path_, "HDF5", "groups like PartType0, or an array of positions (N × 3) in the root",
                      fmt::format("arrays {}; groups {}", shapesOf(arrays), names.empty() ? "none" : names),
                      "name it Coordinates, or make an NPY file of it with Python's h5py and numpy");
@@ -289,11 +297,9 @@ void Hdf5Reader::openPlain(const Hdf5File& file, const std::vector<std::string>&
 void Hdf5Reader::readArray(const std::string& name, ChannelSink& sink) const {
   std::vector<std::byte> block;
   for (const Part& part : parts_) {
-    const Hdf5File file(part.path);
     const Hdf5Array& array = *find(part.arrays, name);
-    const auto rows = file.rows(group_, array);
-    const std::size_t row = numberSize(array.type) * array.arity;
-    while (const std::size_t here = rows->next(block)) sink.append(block.data(), row, here);
+    const auto rows = hdf5Rows(part.path, group_, array);
+    while (const std::size_t here = rows->next(block)) sink.append(block.data(), array.rowBytes(), here);
   }
 }
 

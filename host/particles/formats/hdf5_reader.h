@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "host/particles/formats/hdf5_file.h"
@@ -44,14 +45,14 @@ class Hdf5Reader : public ParticleFile {
     std::vector<Hdf5Array> arrays;
   };
   void openSnapshot(const Hdf5File& first);
-  void openPlain(const Hdf5File& file, const std::vector<std::string>& groups);
+  void openPlain(const Hdf5File& file);
   std::vector<std::string> partPaths() const;
-  void chooseGroup();
+  void chooseGroup(std::span<const std::vector<Hdf5Group>> files);
   void addArrays(const std::string& counted);
   void addMasses();
   void addRadius();
   void addChannel(Channel channel, Source source);
-  double metaNumber(const std::string& name, std::size_t index) const;
+  double metaNumber(std::string_view name, std::size_t index) const;
   void readArray(const std::string& name, class ChannelSink& sink) const;
   std::vector<double> numbers(const std::string& array) const;
 
