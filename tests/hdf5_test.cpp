@@ -361,53 +361,36 @@ std::string two(bool newest) {
   return made(fill, newest);
 }
 
-// A file is opened in a process of its own, which takes a while: hence every byte of new structures, which are short,
-// but of old ones, most of which are room for more, every 16th.
 TEST(Hdf5Reader, RefusesTruncationAtEveryByte) {
   for (const bool newest : {false, true}) {
     const std::string whole = two(newest);
-    for (std::size_t size = 0; size < whole.size(); size += newest ? 1 : 16)
-      expectFileRefused(whole.substr(0, size), {"particles"});
+    for (std::size_t size = 0; size < whole.size(); ++size) expectFileRefused(whole.substr(0, size), {"particles"});
+    expectFileRefused(whole.substr(0, 60), {std::to_string(whole.size()) + " bytes", "got 60", "the file is cut off"});
   }
 }
 
-/// Opens and reads the file with a byte changed by each of the masks. It must be refused or read.
-void expectDamageSurvived(const std::string& whole, std::size_t at, std::initializer_list<int> masks) {
-  for (const int mask : masks) {
-    std::string bytes = whole;
-    bytes[at] = static_cast<char>(bytes[at] ^ mask);
-    try {
-      const OpenedFile opened(bytes);
-      EXPECT_LE(opened.file->count(), 10000u) << at;
-      opened.readAll();
-    } catch (const InputError&) {
-      continue;
+TEST(Hdf5Reader, SurvivesDamage) {
+  // A file is opened in a process of its own, which takes a while, and most of it is room for more: a bit of every byte
+  // that says something, and every 16th that does not.
+  for (const bool newest : {false, true}) {
+    const std::string whole = two(newest);
+    std::size_t refused = 0;
+    std::vector<std::string> warnings;
+    const WarningsKept kept(warnings);
+    for (std::size_t k = 0; k < whole.size(); ++k) {
+      if (whole[k] == 0 && k % 16 != 0) continue;
+      std::string bytes = whole;
+      bytes[k] = static_cast<char>(bytes[k] ^ (whole[k] == 0 ? 255 : 1 << k % 8));
+      try {
+        const OpenedFile opened(bytes);
+        EXPECT_LE(opened.file->count(), 10000u) << k;
+        opened.readAll();
+      } catch (const InputError&) {
+        ++refused;
+      }
     }
+    EXPECT_GT(refused, 0u);
   }
-}
-
-TEST(Hdf5Reader, SurvivesAFlippedBitInEveryByte) { expectEveryFlippedBitSurvived(two(true), 10000, 9); }
-
-TEST(Hdf5Reader, SurvivesDamageOfOldStructures) {
-  // They have no checksums: every byte that says something, and every 16th that does not.
-  const std::string whole = two(false);
-  std::vector<std::string> warnings;
-  const WarningsKept kept(warnings);
-  for (std::size_t k = 0; k < whole.size(); ++k)
-    if (whole[k] != 0)
-      expectDamageSurvived(whole, k, {1 << k % 8, 255});
-    else if (k % 16 == 0)
-      expectDamageSurvived(whole, k, {255});
-}
-
-/// A file whose chunk has no rows makes libhdf5 1.10 divide by zero.
-TEST(Hdf5Reader, RefusesWhatMakesItsLibraryCrash) {
-  std::string whole = two(false);
-  // The chunk's dimensions in the layout's message: rank 3, address, then 2 × 3 × 4 bytes.
-  const std::size_t chunk = whole.find(std::string("\x02\0\0\0\x03\0\0\0\x04\0\0\0", 12));
-  ASSERT_NE(chunk, std::string::npos);
-  whole[chunk] = 0;
-  expectFileRefused(whole, {"libhdf5", "some that make it crash", "the file is damaged"});
 }
 
 TEST(Hdf5Reader, RefusesArraysThatTheFileCannotHold) {
@@ -490,7 +473,8 @@ TEST(Hdf5Reader, SaysWhichFilesHaveTheNumbersOfAVirtualOne) {
 TEST(Hdf5Reader, PrintsNothingOfItsLibrary) {
   ::testing::internal::CaptureStderr();
   std::string whole = two(true);
-  expectFileRefused(whole.substr(0, whole.size() / 2), {"a file that libhdf5 opens", "cut off"});
+  whole[12] = 1;  // the superblock's, whose checksum is then another
+  expectFileRefused(whole, {"a file that libhdf5 opens", "checksum"});
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
 }
 

@@ -18,6 +18,15 @@ const Hdf5Group* Hdf5File::group(const std::string& name) const {
   return found == groups_.end() ? nullptr : &*found;
 }
 
+std::size_t hdf5Begin(std::span<const std::byte> start) {
+  constexpr char kSignature[] = {'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
+  constexpr std::size_t kFirstUserBlock = 512;  // the signature stands at 0, 512, 1024, 2048 …
+  std::size_t at = 0;
+  for (; at + sizeof kSignature <= start.size(); at = at == 0 ? kFirstUserBlock : 2 * at)
+    if (std::memcmp(start.data() + at, kSignature, sizeof kSignature) == 0) return at;
+  return start.size();
+}
+
 #ifndef MOTE_HAS_HDF5
 
 bool hasHdf5() { return false; }
@@ -39,6 +48,32 @@ namespace {
 unsigned secondsFor(const std::string& path) {
   constexpr std::uint64_t kBytesASecond = 2'000'000, kMost = 1'000'000;
   return static_cast<unsigned>(10 + std::min(kMost, InputFile(path).bytes() / kBytesASecond));
+}
+
+/// Refuses a file that ends before it says so itself; the superblock's form is that of the HDF5 File Format
+/// Specification, II.A. Whatever else is wrong with it libhdf5 finds.
+void requireWhole(const std::string& path) {
+  const InputFile file(path);
+  constexpr std::size_t kMostUserBlock = 1 << 16, kSuperblock = 48;
+  const std::vector<std::byte> bytes = file.start(kMostUserBlock + kSuperblock);
+  const std::size_t begin = hdf5Begin(bytes);
+  const auto cutOff = [&](std::uint64_t expected) {
+    throw InputError(path, "HDF5", fmt::format("{} bytes", expected), fmt::format("{}", file.bytes()),
+                     "the file is cut off: it was not copied, or not written, to its end");
+  };
+  if (begin + kSuperblock > bytes.size()) cutOff(begin + kSuperblock);
+  const auto byte = [&](std::size_t at) { return std::to_integer<unsigned>(bytes[begin + at]); };
+  const auto address = [&](std::size_t at) {
+    std::uint64_t value = 0;
+    std::memcpy(&value, &bytes[begin + at], sizeof value);
+    return value;
+  };
+  const unsigned version = byte(8), width = byte(version < 2 ? 13 : 9);
+  if (version > 3 || width != 8) return;
+  const std::size_t base = version == 0 ? 24 : version == 1 ? 28 : 12;
+  const std::uint64_t end = address(base + 16);
+  constexpr std::uint64_t kUndefined = ~std::uint64_t{0};
+  if (begin == 0 && address(base) == 0 && end != kUndefined && end > file.bytes()) cutOff(end);
 }
 
 /// Groups as bytes, from one process to the other.
@@ -147,6 +182,7 @@ class ChildRows : public Hdf5Rows {
 }  // namespace
 
 Hdf5File::Hdf5File(std::string path) : path_(std::move(path)) {
+  requireWhole(path_);
   ChildStream stream(path_, "libhdf5", secondsFor(path_), [&](const ChildStream::Send& send) {
     for (const Hdf5Group& found : Hdf5Library(path_).groups()) {
       Packer packer;

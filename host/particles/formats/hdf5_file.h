@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,9 @@ struct Hdf5Group {
   std::vector<Hdf5Array> arrays;     ///< by name; datasets of other kinds are left out
   std::vector<Metadata> attributes;  ///< up to 64 numbers each, or a text
 };
+
+/// Where HDF5 begins in a file that begins so, which may have something else before it; start.size() where it is none.
+std::size_t hdf5Begin(std::span<const std::byte> start);
 
 /// Whether libhdf5 is in this build (CMake option MOTE_HDF5). Without it Hdf5File's constructor throws InputError.
 bool hasHdf5();

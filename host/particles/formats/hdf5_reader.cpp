@@ -20,8 +20,6 @@
 namespace mote {
 namespace {
 
-constexpr char kMagic[] = {'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
-constexpr std::size_t kFirstUserBlock = 512;  ///< the signature stands at 0, 512, 1024, 2048 …
 constexpr std::uint64_t kMostFiles = 1 << 16;
 constexpr std::string_view kTypes = "PartType";
 /// Names that programs give positions; of these the root of a plain file has one.
@@ -65,11 +63,7 @@ bool isDigits(std::string_view text) {
 
 }  // namespace
 
-bool beginsAsHdf5(std::span<const std::byte> start) {
-  for (std::size_t at = 0; at + sizeof kMagic <= start.size(); at = at == 0 ? kFirstUserBlock : 2 * at)
-    if (std::memcmp(start.data() + at, kMagic, sizeof kMagic) == 0) return true;
-  return false;
-}
+bool beginsAsHdf5(std::span<const std::byte> start) { return hdf5Begin(start) < start.size(); }
 
 Hdf5Reader::Hdf5Reader(std::string path) : ParticleFile(std::move(path)) {
   const Hdf5File file(path_);
