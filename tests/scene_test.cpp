@@ -498,9 +498,9 @@ TEST(SceneReader, RefusesKeysThatContradictEachOther) {
   EXPECT_TRUE(contains(source(R"("density":1)"), R"(/particles/0: expected "file" or "generate", got neither)"));
   EXPECT_TRUE(
       contains(source(R"("generate":"ball")"), R"(/particles/0: expected "count" beside "generate", got none)"));
-  EXPECT_TRUE(
-      contains(source(R"("file":"x","count":5)"), R"(/particles/0/count: expected "count" only beside "generate")"));
-  EXPECT_TRUE(contains(source(R"("file":"x","seed":5)"), R"(/particles/0/seed: )"));
+  EXPECT_TRUE(contains(source(R"("file":"x","count":0)"), R"(/particles/0/count: )"));
+  EXPECT_TRUE(contains(source(R"("generate":"ball","count":1,"grid":"density")"),
+                       R"(/particles/0/grid: expected "grid" only beside "file")"));
   EXPECT_TRUE(contains(source(R"("generate":"ball","count":1,"channels":{})"), R"(/particles/0/channels: )"));
   EXPECT_TRUE(contains(errorOf(with(R"("medium":{"density_scale":1,"optical_depth":4})")),
                        R"(/medium/optical_depth: expected either "density_scale" or "optical_depth", got both)"));

@@ -384,9 +384,10 @@ TEST(SceneSchema, RefusesAnUnknownKeyInEveryObjectAsTheParserDoes) {
 
 TEST(SceneSchema, RefusesAMissingRequiredKeyAsTheParserDoes) {
   EXPECT_FALSE(parse(json::object()).accepted);
-  for (const json& source : {json{{"count", 3}}, json{{"generate", "ball"}}, json{{"file", "a"}, {"generate", "ball"}},
-                             json{{"file", "a"}, {"count", 3}}, json{{"file", "a"}, {"seed", 3}},
-                             json{{"generate", "ball"}, {"count", 1}, {"channels", json::object()}}}) {
+  for (const json& source :
+       {json{{"count", 3}}, json{{"generate", "ball"}}, json{{"file", "a"}, {"generate", "ball"}},
+        json{{"file", "a"}, {"count", 0}}, json{{"generate", "ball"}, {"count", 1}, {"grid", "density"}},
+        json{{"generate", "ball"}, {"count", 1}, {"channels", json::object()}}}) {
     const json scene = {{"particles", {source}}};
     EXPECT_FALSE(accepts(schema(), scene)) << scene;
     EXPECT_FALSE(parse(scene).accepted) << scene;

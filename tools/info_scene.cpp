@@ -54,7 +54,7 @@ SourceFacts fileFacts(const ParticleSource& source, int frame) {
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored))
     throw InputError(path, "", "a particle file", "no such file", nearestNames(source.file, path));
-  const std::unique_ptr<ParticleFile> file = openParticleFile(path);
+  const std::unique_ptr<ParticleFile> file = openParticleFile(path, samplingOf(source));
   const auto has = [&](const std::string& ours) {
     return file->channel(nameInFile(source, *file, ours).theirs) != nullptr;
   };

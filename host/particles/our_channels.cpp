@@ -62,4 +62,10 @@ std::string ourNameOf(const ParticleFile& file, const std::string& theirs) {
   return "";
 }
 
+VolumeSampling samplingOf(const ParticleSource& source) {
+  VolumeSampling sampling{.count = {}, .seed = source.seed, .grid = source.grid};
+  if (source.count > 0) sampling.count = source.count;
+  return sampling;
+}
+
 }  // namespace mote

@@ -27,4 +27,7 @@ ChannelName nameInFile(const ParticleSource& source, const ParticleFile& file, c
 /// The one of our channels that a file's channel is, by its name; empty: none.
 std::string ourNameOf(const ParticleFile& file, const std::string& theirs);
 
+/// What the scene says of a volume's particles.
+VolumeSampling samplingOf(const ParticleSource& source);
+
 }  // namespace mote

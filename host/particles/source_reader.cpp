@@ -43,7 +43,7 @@ std::unique_ptr<ParticleFile> openFile(const ParticleSource& source, const std::
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored))
     throw InputError(path, "", "a particle file", "no such file", nearestNames(source.file, path));
-  return openParticleFile(path);
+  return openParticleFile(path, samplingOf(source));
 }
 
 /// Which channel the radii come from, if any.

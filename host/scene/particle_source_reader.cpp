@@ -68,6 +68,7 @@ ParticleSource readParticleSource(ObjectReader& object, const std::filesystem::p
                            {{"ball", Generator::Ball}, {"cloud", Generator::Cloud}, {"plume", Generator::Plume}});
   object.integer<std::uint64_t>("count", source.count, 1, 4'000'000'000, "particles");
   object.integer<std::uint64_t>("seed", source.seed, 0, std::numeric_limits<std::uint64_t>::max());
+  object.text("grid", source.grid);
   readRadius(object, source.radius);
   readChannels(object, source.channels);
   readMeaning(object, source);
@@ -84,9 +85,7 @@ ParticleSource readParticleSource(ObjectReader& object, const std::filesystem::p
   } else if (generated && !object.has("count")) {
     object.problem("", R"("count" beside "generate")", "none");
   }
-  object.onlyWhere(!fromFile || generated, "count", R"("count" only beside "generate")");
-  object.onlyWhere(!fromFile || generated, "seed", R"("seed" only beside "generate")");
-  for (const char* key : {"channels", "up", "unit", "velocity_per", "interpolate"})
+  for (const char* key : {"grid", "channels", "up", "unit", "velocity_per", "interpolate"})
     object.onlyWhere(!generated || fromFile, key, fmt::format("\"{}\" only beside \"file\"", key));
   object.finish();
   return source;

@@ -45,8 +45,9 @@ struct ParticleSource {
   std::string pointer;  ///< where it stands in the scene, "/particles/0": the place of messages
   std::string file;     ///< path as opened (relative paths resolved), may hold #### or %04d; empty if generated
   Generator generate = Generator::None;
-  std::uint64_t count = 0;  ///< generated particles, 1 … 4e9
+  std::uint64_t count = 0;  ///< particles to generate, or to draw from a volume, 1 … 4e9; 0: not said, of a file
   std::uint64_t seed = 0;
+  std::string grid;  ///< of a file with several: which; empty: not said
   RadiusRule radius;
   std::map<std::string, std::string> channels;      ///< ours → theirs
   std::optional<UpAxis> up;                         ///< of the file; none: y

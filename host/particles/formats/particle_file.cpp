@@ -10,6 +10,7 @@
 #include "host/particles/formats/houdini_reader.h"
 #include "host/particles/formats/hdf5_reader.h"
 #include "host/particles/formats/input_file.h"
+#include "host/particles/formats/nanovdb_reader.h"
 #include "host/particles/formats/npy_reader.h"
 #include "host/particles/formats/npz_reader.h"
 #include "host/particles/formats/ply_reader.h"
@@ -26,14 +27,15 @@ struct Format {
   const char* name;  ///< for people
   /// Whether a file that begins so is of this format; at most kStart bytes are given.
   bool (*begins)(std::span<const std::byte> start);
-  std::unique_ptr<ParticleFile> (*open)(const std::string& path);
+  std::unique_ptr<ParticleFile> (*open)(const std::string& path, const VolumeSampling& sampling);
   bool packed = false;  ///< may be packed with gzip
+  bool grids = false;   ///< holds grids with names
 };
 
 constexpr std::size_t kStart = 1 << 16;
 
 template <class Reader>
-std::unique_ptr<ParticleFile> open(const std::string& path) {
+std::unique_ptr<ParticleFile> open(const std::string& path, const VolumeSampling&) {
   return std::make_unique<Reader>(path);
 }
 
@@ -48,6 +50,7 @@ constexpr Format kFormats[] = {
     {"classic BGEO", beginsAsBgeo, open<BgeoReader>, true},
     {"Houdini's GEO and BGEO", beginsAsHoudini, open<HoudiniReader>, true},
     {"HDF5 (GADGET-4, AREPO, SWIFT)", beginsAsHdf5, open<Hdf5Reader>},
+    {"NanoVDB fog volumes", beginsAsNanoVdb, openNanoVdb, false, true},
     {"CSV and other tables of numbers", beginsAsTable, open<CsvReader>},  // last: any text might be one
 };
 
@@ -65,6 +68,18 @@ const Format* formatOf(const Start& start) {
   for (const Format& format : kFormats)
     if (format.begins(start.bytes)) return &format;
   return nullptr;
+}
+
+/// What is said of drawing particles must not be lost on a file that has its own.
+void requireMeaning(const ParticleFile& file, bool grids, const VolumeSampling& sampling) {
+  const auto refuse = [&](const char* field, const std::string& got) {
+    throw InputError(file.path(), field,
+                     fmt::format("none, as the file ({}) holds {} particles already", file.format(), file.count()), got,
+                     fmt::format("\"{}\" is for volumes, which particles are drawn from", field));
+  };
+  if (sampling.count && !file.drawn()) refuse("count", fmt::format("{}", *sampling.count));
+  if (sampling.seed != 0 && !file.drawn()) refuse("seed", fmt::format("{}", sampling.seed));
+  if (!sampling.grid.empty() && !grids) refuse("grid", fmt::format("'{}'", sampling.grid));
 }
 
 }  // namespace
@@ -88,10 +103,14 @@ std::string particleFormats() {
 
 bool isParticleFile(const std::string& path) { return formatOf(Start(path)) != nullptr; }
 
-std::unique_ptr<ParticleFile> openParticleFile(const std::string& path) {
+std::unique_ptr<ParticleFile> openParticleFile(const std::string& path, const VolumeSampling& sampling) {
   const Start start(path);
   const Format* format = formatOf(start);
-  if (format && (format->packed || !start.packed)) return format->open(path);
+  if (format && (format->packed || !start.packed)) {
+    std::unique_ptr<ParticleFile> file = format->open(path, sampling);
+    requireMeaning(*file, format->grids, sampling);
+    return file;
+  }
   if (format)
     throw InputError(path, "", fmt::format("{} as it is", format->name), "packed with gzip", "gunzip it first");
   throw InputError(path, "", fmt::format("a particle file in a format that Mote reads ({})", particleFormats()),

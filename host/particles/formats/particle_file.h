@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "host/particles/formats/channel.h"
+#include "host/particles/formats/volume_sampling.h"
 
 namespace mote {
 
@@ -35,6 +36,9 @@ class ParticleFile {
   /// MachineError where memory runs out. The targets are then unspecified.
   virtual void read(std::span<const ChannelRequest> requests) const = 0;
 
+  /// Whether its particles are drawn from a volume, so that count, seed and grid of VolumeSampling mean something.
+  virtual bool drawn() const { return false; }
+
  protected:
   explicit ParticleFile(std::string path) : path_(std::move(path)) {}
   ParticleFile(ParticleFile&&) = default;
@@ -52,7 +56,9 @@ bool isParticleFile(const std::string& path);
 std::string particleFormats();
 
 /// Opens a file by its content, not by its name. Throws InputError: what is missing, not readable, damaged before the
-/// first particle, or in none of the formats that are read; the last says which they are.
-std::unique_ptr<ParticleFile> openParticleFile(const std::string& path);
+/// first particle, or in none of the formats that are read; the last says which they are. `sampling` is for volumes; of
+/// a file that holds points in several grids its `grid` says which. Throws InputError (field "count", "seed" or "grid")
+/// where it asks something of a file that holds particles as they are.
+std::unique_ptr<ParticleFile> openParticleFile(const std::string& path, const VolumeSampling& sampling = {});
 
 }  // namespace mote
