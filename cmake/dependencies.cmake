@@ -29,8 +29,8 @@ find_file(VOLK_SOURCE volk.c PATHS /usr/include REQUIRED)
 add_library(volk STATIC ${VOLK_SOURCE})
 target_link_libraries(volk PUBLIC Vulkan::Headers ${CMAKE_DL_LIBS})
 
-# mote_peers alone. OpenVDB's own find module demands Boost's libraries too, which it was built with and we do not use.
-if(MOTE_PEERS)
+# OpenVDB's own find module demands Boost's libraries too, which it was built with and we do not use.
+if(MOTE_OPENVDB OR MOTE_PEERS)
   find_path(OPENVDB_INCLUDE openvdb/openvdb.h REQUIRED)
   find_library(OPENVDB_LIBRARY openvdb REQUIRED)
   add_library(OpenVDB::openvdb UNKNOWN IMPORTED)

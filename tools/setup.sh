@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that Mote is built from and tested with, as far as they are missing.
-# tools/setup.sh --peers     also what mote_peers (-DMOTE_PEERS=ON) is built from.
 # tools/setup.sh --interop   also the programs that ctest's label `interop` reads and writes files with (VTK: 1 GB).
 # Needs root or sudo, and only where something is missing; no terminal. MOTE_NO_SETUP=1 leaves the machine as it is.
 set -euo pipefail
@@ -12,14 +11,14 @@ packages=(
   libglm-dev libtbb-dev libopenexr-dev libpng-dev libssl-dev
   zlib1g-dev liblz4-dev libzip-dev libblosc-dev libpugixml-dev libnanoflann-dev libhdf5-dev
   libassimp-dev libembree-dev libcli11-dev nlohmann-json3-dev libfmt-dev libhwy-dev libgtest-dev
+  libopenvdb-dev libboost-dev libnanovdb-dev
   imagemagick fonts-dejavu-core python3 python3-numpy
 )
 for group in "$@"; do
   case "$group" in
-    --peers) packages+=(libopenvdb-dev libboost-dev) ;;
-    --interop) packages+=(python3-numpy python3-h5py hdf5-tools python3-vtk9) ;;
+    --interop) packages+=(python3-numpy python3-h5py hdf5-tools python3-vtk9 python3-openvdb) ;;
     *)
-      printf 'usage: tools/setup.sh [--peers] [--interop]   (got "%s")\n' "$*" >&2
+      printf 'usage: tools/setup.sh [--interop]   (got "%s")\n' "$*" >&2
       exit 2
       ;;
   esac

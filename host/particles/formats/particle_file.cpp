@@ -16,6 +16,7 @@
 #include "host/particles/formats/ply_reader.h"
 #include "host/particles/formats/prt2_reader.h"
 #include "host/particles/formats/prt_reader.h"
+#include "host/particles/formats/vdb_reader.h"
 #include "host/particles/formats/vtk_reader.h"
 #include "host/particles/formats/vtk_xml_reader.h"
 
@@ -50,6 +51,7 @@ constexpr Format kFormats[] = {
     {"classic BGEO", beginsAsBgeo, open<BgeoReader>, true},
     {"Houdini's GEO and BGEO", beginsAsHoudini, open<HoudiniReader>, true},
     {"HDF5 (GADGET-4, AREPO, SWIFT)", beginsAsHdf5, open<Hdf5Reader>},
+    {"OpenVDB points and fog volumes", beginsAsVdb, openVdb, false, true},
     {"NanoVDB fog volumes", beginsAsNanoVdb, openNanoVdb, false, true},
     {"CSV and other tables of numbers", beginsAsTable, open<CsvReader>},  // last: any text might be one
 };
