@@ -114,11 +114,10 @@ struct AttributeType {
   std::uint32_t arity;
 };
 const std::string kPosition = "Position";
-constexpr AttributeType kAttributeTypes[] = {{"float", NumberType::F32, 1}, {"double", NumberType::F64, 1},
-                                             {"bool", NumberType::U8, 1},   {"int8", NumberType::I8, 1},
-                                             {"int16", NumberType::I16, 1}, {"int32", NumberType::I32, 1},
-                                             {"int64", NumberType::I64, 1}, {"vec3s", NumberType::F32, 3},
-                                             {"vec3d", NumberType::F64, 3}, {"vec3i", NumberType::I32, 3}};
+constexpr AttributeType kAttributeTypes[] = {
+    {"float", NumberType::F32, 1}, {"double", NumberType::F64, 1}, {"int8", NumberType::I8, 1},
+    {"int16", NumberType::I16, 1}, {"int32", NumberType::I32, 1},  {"int64", NumberType::I64, 1},
+    {"vec3s", NumberType::F32, 3}, {"vec3d", NumberType::F64, 3},  {"vec3i", NumberType::I32, 3}};
 
 const AttributeType* attributeType(const std::string& name) {
   for (const AttributeType& type : kAttributeTypes)
@@ -255,7 +254,6 @@ void VdbPoints::fill(std::size_t channel, std::size_t leaf, std::byte* to) const
   switch (c.type) {
     case NumberType::F32: return fillValues<float>(array, count, to);
     case NumberType::F64: return fillValues<double>(array, count, to);
-    case NumberType::U8: return fillValues<bool>(array, count, to);
     case NumberType::I8: return fillValues<std::int8_t>(array, count, to);
     case NumberType::I16: return fillValues<std::int16_t>(array, count, to);
     case NumberType::I32: return fillValues<std::int32_t>(array, count, to);
