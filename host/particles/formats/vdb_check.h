@@ -29,7 +29,7 @@ bool isVdbScalarTree(const std::string& type);
 bool isVdbVectorTree(const std::string& type);
 bool isVdbPointTree(const std::string& type);
 
-/// Throws InputError, which names the byte, on any breach. `type` must be one of those above. Cost: 1 GB/s.
+/// Throws InputError, which names the byte, on any breach. `type` must be one of those above. Cost: little beside that of reading the tree.
 void checkVdbTree(const VdbTree& tree);
 
 }  // namespace mote
