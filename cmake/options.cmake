@@ -17,3 +17,6 @@ if(MOTE_SANITIZE)
   target_compile_options(mote_options INTERFACE -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(mote_options INTERFACE -fsanitize=address,undefined)
 endif()
+if(MOTE_FUZZ)
+  target_compile_options(mote_options INTERFACE -fsanitize=fuzzer-no-link) # coverage, for libFuzzer
+endif()

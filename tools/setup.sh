@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that Mote is built from and tested with, as far as they are missing.
 # tools/setup.sh --interop   also the programs that ctest's label `interop` reads and writes files with (VTK: 1 GB).
+# tools/setup.sh --fuzz      also the compiler that tools/fuzz.sh builds with.
 # Needs root or sudo, and only where something is missing; no terminal. MOTE_NO_SETUP=1 leaves the machine as it is.
 set -euo pipefail
 
@@ -17,8 +18,9 @@ packages=(
 for group in "$@"; do
   case "$group" in
     --interop) packages+=(python3-numpy python3-h5py hdf5-tools python3-vtk9 python3-openvdb) ;;
+    --fuzz) packages+=(clang libclang-rt-14-dev) ;;
     *)
-      printf 'usage: tools/setup.sh [--interop]   (got "%s")\n' "$*" >&2
+      printf 'usage: tools/setup.sh [--interop] [--fuzz]   (got "%s")\n' "$*" >&2
       exit 2
       ;;
   esac

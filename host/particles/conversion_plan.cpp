@@ -124,12 +124,14 @@ void store(Inputs inputs, const ConversionOptions& options, std::span<const Plan
 }
 
 void requireTypesUsed(const ConversionOptions& options, std::span<const PlannedChannel> channels) {
-  for (const auto& [name, type] : options.types)
+  for (const auto& entry : options.types) {
+    const std::string& name = entry.first;
     if (std::none_of(channels.begin(), channels.end(), [&](const auto& p) { return p.written.channel.name == name; })) {
       std::string names;
       for (const PlannedChannel& p : channels) names += (names.empty() ? "" : ", ") + p.written.channel.name;
       throw InputError("--type", "", "a channel that is written: " + names, fmt::format("'{}'", name));
     }
+  }
 }
 
 /// Values of the first input, for the channels as they are now called.

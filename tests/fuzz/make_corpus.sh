@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# Makes tests/fuzz/corpus/ anew: of what is there, what the readers' own tests write (good files and hostile ones), the
+# scenes of scenes/ and what tools/fuzz.sh has learnt, the least that reaches the same code.
+# tests/fuzz/make_corpus.sh [TARGET...]   Needs the presets dev, for the tests, and fuzz; TESTS names a folder of built ones.
+set -euo pipefail
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")/../.."
+
+# Which tests write files for which target. A new target has a line here.
+declare -A writers=(
+  [prt]="prt_test writer_test" [prt2]="prt2_test writer_test"
+  [npy]="npy_test writer_test" [npz]=npz_test [ply]="ply_test writer_test" [csv]="csv_test writer_test"
+  [vtk]=vtk_test [vtk_xml]=vtk_xml_test [bgeo]=bgeo_test [houdini]=houdini_test [hdf5]=hdf5_test
+  [salvage]="salvage_test prt_test prt2_test" [gltf]="gltf_import_test solids_test" [scene]=gltf_import_test
+)
+targets=("$@")
+if [[ $# -eq 0 ]]; then mapfile -t targets < <(printf '%s\n' "${!writers[@]}" | sort); fi
+most_bytes=20000 # of a target's corpus: 300 kB all together
+
+build=build/fuzz
+tests=${TESTS:-build/dev/tests}
+if [[ -z "${TESTS:-}" ]]; then
+  cmake --preset dev
+  # shellcheck disable=SC2086 # words of lists
+  for target in "${targets[@]}"; do printf '%s\n' ${writers[$target]}; done | sort -u |
+    xargs cmake --build --preset dev --target
+fi
+mkdir -p "$build/seeds"
+cc -shared -fPIC -O1 -o "$build/keep_files.so" tests/fuzz/keep_files.c
+
+for target in "${targets[@]}"; do
+  seeds=$build/seeds/$target corpus=tests/fuzz/corpus/$target fuzzer=$build/tests/fuzz/fuzz_$target
+  mkdir -p "$seeds" "$corpus" "$build/corpus/$target"
+  for test in ${writers[$target]}; do
+    KEEP_FILES=$PWD/$seeds LD_PRELOAD=$PWD/$build/keep_files.so "$tests/$test" --gtest_brief=1 >/dev/null
+  done
+  if [[ $target == scene ]]; then find scenes -name '*.json' ! -name '*.schema.json' -exec cp -t "$seeds" -- {} +; fi
+
+  # Smallest first, so that small files stand for what large ones reach too; edges count, not how often.
+  rm -rf "$build/merged"
+  mkdir "$build/merged"
+  ASAN_OPTIONS=quarantine_size_mb=16 "$fuzzer" -merge=1 -use_counters=0 -max_len=4096 \
+    "$build/merged" "$corpus" "$seeds" "$build/corpus/$target" >"$build/$target.merge.log" 2>&1
+  bytes=0
+  rm -rf "$corpus"
+  mkdir "$corpus"
+  while read -r size name; do
+    if ((bytes + size > most_bytes)); then break; fi
+    bytes=$((bytes + size))
+    cp "$build/merged/$name" "$corpus/"
+  done < <(find "$build/merged" -type f -printf '%s %f\n' | sort -n)
+  printf '%-8s %5d seeds, %3d files of %d bytes are kept\n' "$target" "$(find "$seeds" -type f | wc -l)" \
+    "$(find "$corpus" -type f | wc -l)" "$bytes"
+done
