@@ -106,6 +106,14 @@ TEST(NpyReader, RefusesHostileNumbersWithoutAllocating) {
   expectFileRefused(endless + kTwo, {"header length"});
 }
 
+TEST(NpyReader, RefusesMoreChannelsThanAnybodyLooksThrough) {
+  // Each is looked for among all of them: a million would take hours.
+  expectFileRefused(npy(dictionary("'|u1'", "(0, 1000000)"), ""), {"channels", "at most 4096", "1000000"});
+  std::string fields;
+  for (int k = 0; k < 5000; ++k) fields += fmt::format("('a{}', '|u1'), ", k);
+  expectFileRefused(npy(dictionary("[" + fields + "]", "(0,)"), "", 2), {"channels", "at most 4096", "5000"});
+}
+
 TEST(NpyReader, SaysWhatItDoesNotRead) {
   expectFileRefused(npy(dictionary("'|O'", "(2, 3)"), kTwo), {"descr", "objects"});
   expectFileRefused(npy(dictionary("'<c8'", "(2, 3)"), kTwo), {"'<c8'", "complex"});

@@ -221,6 +221,18 @@ TEST(NpzReader, RefusesHostileNumbersWithoutAllocating) {
   expectFileRefused(npz({{"P.npy", endless + kPlaces}}), {"P.npy", "header length"});
 }
 
+TEST(NpzReader, RefusesMoreChannelsThanAnybodyLooksThrough) {
+  expectFileRefused(npz({{"arr_0.npy", npy(dictionary("'|u1'", "(0, 1000000)"), "")}}),
+                    {"arr_0", "channels", "at most 4096", "1000000"});
+}
+
+TEST(NpzReader, KeepsTheFirstOfTwoTextsOfOneName) {
+  const OpenedFile opened(npz(
+      {{"Position.npy", kPlaces}, {"note.npy", column("|S2", "ab", "()")}, {"note.npy", column("|S2", "cd", "()")}}));
+  ASSERT_EQ(opened.file->metadata().size(), 1u);
+  EXPECT_EQ(opened.file->meta("", "note")->bytes, "ab");
+}
+
 TEST(NpzReader, RefusesMembersThatShareTheirBytes) {
   // A directory that names one member many times: small files that unpack to many times what deflate can do.
   const std::string one = npz({{"P.npy", kPlaces}});

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "host/core/log.h"
@@ -135,6 +136,14 @@ TEST(PlyReader, RefusesHostileCountsWithoutAllocating) {
   const std::string list = "element face 1\nproperty list uint double x\n";
   expectFileRefused(ply("binary_little_endian", list + kVertices, std::string("\xff\xff\xff\xff") + vertices(false)),
                     {"element face"});
+  // A list's length that is more than any integer.
+  const std::string floats = "element face 1\nproperty list float uchar x\n";
+  for (const float length : {1e30f, std::numeric_limits<float>::infinity()})
+    expectFileRefused(ply("binary_little_endian", floats + kVertices, rawNumbers<float>({length}) + vertices(false)),
+                      {"element face", "cut off"});
+  std::string many = "element vertex 0\n";
+  for (int k = 0; k < 5000; ++k) many += fmt::format("property uchar a{}\n", k);
+  expectFileRefused(ply("ascii", many, ""), {"channels", "at most 4096", "5000"});
   std::string endless(2 << 20, 'x');
   endless.replace(0, 4, "ply\n");
   expectFileRefused(endless, {"end_header within"});

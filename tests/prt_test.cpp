@@ -282,6 +282,9 @@ TEST(PrtReader, RefusesBadHeaderLengthsAndTables) {
   expectRefused(file, {"channel count"});
   file.channelCount = std::numeric_limits<std::int32_t>::max();
   expectRefused(file, {"channel table", "2147483647 records"});
+  file = {};
+  file.channels.assign(5000, {"A", 1, 1, 0});
+  expectRefused(file, {"channels", "at most 4096", "5000"});
 }
 
 TEST(PrtReader, SkipsWhatLongerRecordsAndHeadersAdd) {

@@ -103,6 +103,12 @@ TEST(VtkReader, SurvivesEveryFlippedBit) {
   expectEveryFlippedBitSurvived(vtk("ASCII", kText), 100);
 }
 
+TEST(VtkReader, RefusesMoreArraysThanAnybodyLooksThrough) {
+  std::string arrays = "POINTS 0 float\nPOINT_DATA 0\nFIELD f 5000\n";
+  for (int k = 0; k < 5000; ++k) arrays += fmt::format("a{} 1 0 char\n", k);
+  expectFileRefused(vtk("ASCII", arrays), {"channels", "at most 4096"});
+}
+
 TEST(VtkReader, SaysWhatIsWrong) {
   expectFileRefused(vtk("ASCII", "", "6.0"), {"version 1 to 5", "6.0"});
   expectFileRefused(vtk("Ascii", ""), {"ASCII or BINARY", "'Ascii'"});

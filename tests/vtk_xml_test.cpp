@@ -377,6 +377,13 @@ TEST(VtkXmlReader, RefusesPiecesThatShareTheirNumbers) {
                     {"numbers of its own", "those of others again"});
 }
 
+TEST(VtkXmlReader, RefusesPointsThatAreNoNumbers) {
+  // Or nobody would have held their number against the file.
+  for (const char* type : {"String", "Bit"})
+    expectFileRefused(piece("1000000000000", std::string("<DataArray type=\"") + type + "\"/>"),
+                      {"Piece 0, Points", "numbers", type});
+}
+
 TEST(VtkXmlReader, TakesDeepAndManyTagsWithoutHarm) {
   std::string deep = "<VTKFile type=\"PolyData\">";
   for (int k = 0; k < 200000; ++k) deep += "<a>";
@@ -384,6 +391,9 @@ TEST(VtkXmlReader, TakesDeepAndManyTagsWithoutHarm) {
   std::string many = "<VTKFile type=\"PolyData\">";
   for (int k = 0; k < 3000000; ++k) many += "<a/>";
   expectFileRefused(many, {"bytes of tags"});
+  std::string arrays = "<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPoints=\"0\"><PointData>";
+  for (int k = 0; k < 5000; ++k) arrays += fmt::format("<DataArray type=\"Int8\" Name=\"a{}\"/>", k);
+  expectFileRefused(arrays + "</PointData></Piece></PolyData></VTKFile>", {"channels", "at most 4096"});
 }
 
 TEST(VtkXmlReader, SaysWhatItDoesNotRead) {

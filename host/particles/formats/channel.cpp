@@ -5,6 +5,8 @@
 #include <bit>
 #include <cstring>
 
+#include "host/core/error.h"
+
 namespace mote {
 
 static_assert(std::endian::native == std::endian::little, "numbers of files are copied as they stand in memory");
@@ -24,6 +26,12 @@ Metadata numbers(std::string channel, std::string name, NumberType type, const T
 }
 
 }  // namespace
+
+void requireFewChannels(const std::string& path, std::uint64_t count) {
+  if (count > kMostChannels)
+    throw InputError(path, "channels", fmt::format("at most {}", kMostChannels), fmt::format("{}", count),
+                     "the file is damaged, or holds something else than particles");
+}
 
 Metadata Metadata::text(std::string channel, std::string name, std::string text) {
   return {std::move(channel), std::move(name), kMetadataText, std::move(text)};

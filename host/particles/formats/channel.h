@@ -22,6 +22,12 @@ struct Channel {
   std::size_t bytes() const { return numberSize(type) * arity; }
 };
 
+/// Of one file. No program comes near, and whoever looks for a channel by its name goes through them all: a few bytes
+/// that claim millions would cost hours.
+constexpr std::size_t kMostChannels = 4096;
+/// Throws InputError where a file is about to have more.
+void requireFewChannels(const std::string& path, std::uint64_t count);
+
 /// Metadata only: UTF-8 text.
 constexpr std::int32_t kMetadataText = -1;
 

@@ -93,6 +93,7 @@ std::vector<PlacedChannel> plainColumns(const std::string& path, std::size_t wid
   if (width < 3)
     throw InputError(path, "columns", "three or more, the first three of which are a position",
                      fmt::format("{} number{} a particle", width, width == 1 ? "" : "s"));
+  requireFewChannels(path, width);
   std::vector<PlacedChannel> channels;
   const auto add = [&](std::string name, std::uint32_t arity, std::size_t column) {
     channels.emplace_back(std::move(name), type, arity, column * numberSize(type));

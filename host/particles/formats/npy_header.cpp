@@ -257,6 +257,7 @@ NpyArray readNpyHeader(const std::string& place, const NpyBytes& bytes, std::uin
   Header header(place, bytes(length, "NPY header"));
   array.dataBegin = start.size() + lengthBytes.size() + length;
   array.shape = std::move(header.shape);
+  requireFewChannels(place, header.fields.size());
   array.structured = header.structured, array.fortranOrder = header.fortranOrder;
   for (const Field& field : header.fields) addField(place, field, array);
   return array;

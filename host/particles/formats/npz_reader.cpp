@@ -142,7 +142,7 @@ void NpzReader::keepMetadata(ZipStream& stream, const Array& array) {
   std::size_t bytes = 0;
   if (!header.notNumbers.empty()) {
     text = textType(header.notNumbers);
-    if (!text || header.structured || !header.shape.empty()) return;
+    if (!text || header.structured || !header.shape.empty() || meta("", array.name)) return;
     bytes = text->bytes;
   } else {
     if (header.structured || header.fields.empty() || !numbers || meta("", array.name)) return;
@@ -243,6 +243,7 @@ void NpzReader::setChannels() {
     }
     begin += array.table.rowBytes;
   }
+  requireFewChannels(path_, columns.size());
   const bool joined = std::none_of(arrays_.begin(), arrays_.end(), [](const Array& a) { return a.header.structured; });
   for (const PlacedChannel& placed : joined ? withVectors(columns) : columns) {
     const Channel& channel = placed.channel;

@@ -165,7 +165,11 @@ void PlyReader::skipElement(const Element& element) {
       return withNumberType(type, [&]<class T>(T) {
         T value;
         std::memcpy(&value, raw, sizeof value);
-        return value > T(0) ? static_cast<std::uint64_t>(value) : std::uint64_t{0};
+        if constexpr (std::is_integral_v<T>)
+          return value > T(0) ? static_cast<std::uint64_t>(value) : std::uint64_t{0};
+        else  // floats may be more than any integer
+          return value > T(0) ? static_cast<std::uint64_t>(std::min(static_cast<double>(value), 0x1p63))
+                              : std::uint64_t{0};
       });
     };
     for (std::uint64_t row = 0; row < element.count; ++row)
@@ -187,6 +191,7 @@ PlyReader::PlyReader(std::string path) : ParticleFile(path), file_(std::move(pat
                      found->properties.empty() ? "none" : "a list");
   for (auto element = elements.begin(); element != found; ++element) skipElement(*element);
 
+  requireFewChannels(path_, found->properties.size());
   for (const Property& p : found->properties) {
     if (std::any_of(columns_.begin(), columns_.end(), [&](const auto& c) { return c.channel.name == p.name; }))
       throw InputError(path_, fmt::format("element {}", found->name), "properties of different names",

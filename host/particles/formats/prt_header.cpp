@@ -146,6 +146,7 @@ struct Parser {
     if (needed > section.left())
       fail("channel table", fmt::format("{} records of {} bytes", count, record),
            fmt::format("only {} bytes in the file", section.left()), "the file is cut off or its header is damaged");
+    requireFewChannels(path, static_cast<std::uint64_t>(count));
     std::set<std::string> names;
     for (std::int32_t i = 0; i < count; ++i) {
       PrtChannel channel = parseChannel(section, i);

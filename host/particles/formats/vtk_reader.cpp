@@ -110,6 +110,7 @@ void VtkReader::keep(ByteStream& bytes, std::string name, const std::string& typ
   if (!ofPoints || !known) return;
   if (tuples != count_) fail(bytes, fmt::format("{} for as many points", count_), std::to_string(tuples));
   if (channel(name)) fail(bytes, "arrays of different names", name);
+  requireFewChannels(path_, channels_.size() + 1);
   channels_.push_back({std::move(name), *known, static_cast<std::uint32_t>(arity)});
   begins_.push_back(begin);
 }

@@ -168,6 +168,7 @@ struct VtkXmlReader::Piece {
     const pugi::xml_node array = node.child("Points").child("DataArray");
     if (!array && points > 0) part->fail(what, "Points with a DataArray", "none");
     if (array) add(array, "Position");
+    if (channels.empty() && points > 0) part->fail(what + ", Points", "numbers", array.attribute("type").value());
     if (!channels.empty() && channels[0].arity != 3)
       part->fail(what + ", Points", "3 components", fmt::format("{}", channels[0].arity));
     for (const pugi::xml_node& own : node.child("PointData").children("DataArray")) {
@@ -193,6 +194,7 @@ struct VtkXmlReader::Piece {
     const std::optional<NumberType> known = typeNamed(type);
     if (!known) part->fail(array + ", type", "one like Float32 or UInt8", shown(type));
     if (has(name)) part->fail(array, "arrays of different names", "it twice");
+    requireFewChannels(part->file.path(), channels.size() + 1);
     Channel channel{name, *known, static_cast<std::uint32_t>(part->arity(node, array))};
     if (channel.type == NumberType::U8 && (channel.arity == 3 || channel.arity == 4)) channel.scale = 1.0 / 255;
     places.push_back(part->place(node, array));
