@@ -114,6 +114,16 @@ TEST(Prt2Reader, ReadsEveryCompression) {
   }
 }
 
+TEST(Prt2Reader, TakesBlocksWithoutParticles) {
+  Prt2File file;
+  file.compression = "uncompressed", file.blocks = 4;
+  file.rows = {"", Prt2File::row(1, 10), "", Prt2File::row(2, 20) + Prt2File::row(3, 30)};
+  for (const char* kind : {"Part", "PrtO"}) {
+    file.partKind = kind;
+    EXPECT_EQ(OpenedFile(file.bytes()).read<std::uint64_t>("ID"), (std::vector<std::uint64_t>{10, 20, 30}));
+  }
+}
+
 TEST(Prt2Reader, AddsTheOffsetsOfBlocks) {
   Prt2File file;
   file.partKind = "PrtO", file.stream = "LOD0";

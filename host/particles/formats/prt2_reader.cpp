@@ -366,6 +366,7 @@ void Prt2Reader::read(std::span<const ChannelRequest> requests) const {
     for (ChannelSink& sink : sinks) sink.reserve(std::min<std::uint64_t>(count_, 1 << 20));
     for (std::uint64_t k = 0; k < stream_.blocks; ++k) {
       readBlock(blocks, done, block);
+      if (block.count == 0) continue;
       for (ChannelSink& sink : sinks)
         if (sink.index() == position_)
           sink.append(reinterpret_cast<const std::byte*>(block.positions.data()), 3 * sizeof(double), block.count);
