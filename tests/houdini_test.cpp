@@ -300,6 +300,35 @@ TEST(HoudiniReader, RefusesHostileNumbersWithoutAllocating) {
   expectFileRefused(start + "\x26\x05", {"defined before", "number 5"});
 }
 
+TEST(HoudiniReader, RefusesShortFilesOfEndlessNumbers) {
+  // Attributes that are each no more than such a file could hold, of one constant page, but not all together.
+  const std::string constant =
+      values(1, "fpreal64", R"("pagesize",1000000,"constantpageflags",[[1]],"rawpagedata",[1])");
+  std::vector<std::string> attributes;
+  for (const char* name : {"a", "b", "c"}) attributes.push_back(attribute(name, constant));
+  const std::size_t bytes = geo(100000, attributes).size();
+  const int points = static_cast<int>(bytes * 1032 / 8 * 2 / 5);  // two fit, three do not
+  EXPECT_EQ(OpenedFile(geo(points, {attributes[0]}) + std::string(bytes, ' ')).file->count(), std::size_t(points));
+  expectFileRefused(geo(points, attributes), {"point attribute 'c'", "for what is left"});
+  // No numbers at all, so that nothing contradicts their number.
+  expectFileRefused(geo(2147483647, {}), {"pointattributes", "2147483647 points", "none"});
+  // Lists in a global attribute's numbers, one byte each.
+  expectFileRefused(geo(0, {}, attribute("g", values(1, "fpreal32", "\"arrays\"," + std::string(1000, '[')))),
+                    {"deep at most"});
+}
+
+TEST(HoudiniReader, TakesALongTextThatIsReferredToAgainAndAgain) {
+  // 1 MB, 200,000 times: nobody could wait for them all to be copied.
+  constexpr std::uint32_t kLong = 1 << 20, kTimes = 200000;
+  const std::string text(kLong, 'x');
+  std::string file = "\x7fNSJb[\x27\x0b";
+  file += "fileversion\x27\x01";
+  file += "9\x27\x0apointcount\x11";
+  file += std::string(1, '\0') + "\x2b\x01\xf4" + rawNumbers<std::uint32_t>({kLong}) + text;
+  for (std::uint32_t k = 0; k < kTimes; ++k) file += "\x26\x01";
+  EXPECT_EQ(OpenedFile(file + "]").file->count(), 0u);
+}
+
 TEST(HoudiniReader, RefusesPackedBombs) {
   // Blocks of zeros that unpack to more than deflate could make of them, and a block that is larger than any.
   const std::string zeros(1 << 22, '\0');

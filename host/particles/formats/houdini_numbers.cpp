@@ -110,7 +110,7 @@ void HoudiniNumbers::endArray() {
   if (inTuple_ != expected) fail(fmt::format("lists of {} numbers", expected), fmt::format("{}", inTuple_));
 }
 
-void HoudiniNumbers::text(std::string& value) { fail("numbers", shown(value)); }
+void HoudiniNumbers::text(const std::string& value) { fail("numbers", shown(value)); }
 
 void HoudiniNumbers::integer(std::int64_t value) {
   storeInteger(value, attribute_.channel.type, room(1));

@@ -25,8 +25,8 @@ class HoudiniNumbers : public JsonEvents {
   void endArray() override;
   bool beginMap() override { fail("numbers", "a map"); }
   void endMap() override {}
-  void key(std::string&) override {}
-  void text(std::string& value) override;
+  void key(const std::string&) override {}
+  void text(const std::string& value) override;
   void integer(std::int64_t value) override;
   void real(double value) override;
   void boolean(bool value) override { integer(value ? 1 : 0); }

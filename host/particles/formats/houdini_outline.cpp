@@ -16,7 +16,8 @@ namespace {
 constexpr std::size_t kMostAttributes = 4096, kMostNumbers = 1024;
 constexpr std::size_t kMostFlags = 1 << 26;     ///< pages of 1024 points, of all attributes
 constexpr std::size_t kMostGlobalNumbers = 64;  ///< kept as metadata
-constexpr std::size_t kMostName = 1024, kMostMetadataText = 1 << 16;
+constexpr std::size_t kMostDepth = 64;          ///< of the lists that are looked into; Houdini needs ten
+constexpr std::size_t kMostName = 1024, kMostMetadataText = 1 << 12;
 constexpr std::uint64_t kMostPageBytes = 1 << 24;  ///< Houdini's have 1024 points
 
 std::optional<NumberType> storageNamed(const std::string& name) {
@@ -32,6 +33,8 @@ std::optional<NumberType> storageNamed(const std::string& name) {
 }
 
 }  // namespace
+
+std::string HoudiniOutline::shortened(const std::string& key) { return key.substr(0, kMostName); }
 
 /// A value begins: in a list it is a key's, or none's.
 void HoudiniOutline::arrive() {
@@ -91,6 +94,9 @@ bool HoudiniOutline::beginArray(std::uint64_t begin) {
   }
   const Room room = roomOf(parent);
   if (room == Room::Nowhere) return false;
+  if (rooms_.size() >= kMostDepth)
+    throw InputError(path_, fmt::format("attribute {}", shown(draft_.name)),
+                     fmt::format("arrays in arrays, {} deep at most", kMostDepth), "deeper ones");
   if (room == Room::PointAttributes || room == Room::GlobalAttributes) ofPoints_ = room == Room::PointAttributes;
   if (room == Room::Attribute) draft_ = Draft();
   if (room == Room::Flags) draft_.values.constantPages.clear();
@@ -115,14 +121,14 @@ void HoudiniOutline::endArray() {
   rooms_.pop_back();
 }
 
-void HoudiniOutline::text(std::string& value) {
+void HoudiniOutline::text(const std::string& value) {
   arrive();
   if (rooms_.empty()) return;
   Place& place = rooms_.back();
   if (place.room == Room::Texts) {
     if (draft_.texts++ == 0) draft_.firstText = value.substr(0, kMostMetadataText);
   } else if (!place.map && place.index % 2 == 1) {  // a key, as this is the first, third …
-    place.key = value;
+    place.key = shortened(value);
   } else {
     setText(place, value);
   }
@@ -131,11 +137,11 @@ void HoudiniOutline::text(std::string& value) {
 void HoudiniOutline::setText(const Place& place, const std::string& value) {
   const std::string& key = place.key;
   if (place.room == Room::Root && key == "fileversion") version_ = value.substr(0, kMostName);
-  if (place.room == Room::Info && (key == "software" || key == "date") && metadata_.size() < kMostAttributes)
+  if (place.room == Room::Info && (key == "software" || key == "date") && !hasMetadata(key))
     metadata_.push_back(Metadata::text("", key, value.substr(0, kMostMetadataText)));
   if (place.room == Room::Definition && key == "name") draft_.name = value.substr(0, kMostName);
-  if (place.room == Room::Definition && key == "type") draft_.type = value;
-  if (place.room == Room::Definition && key == "scope") draft_.scope = value;
+  if (place.room == Room::Definition && key == "type") draft_.type = value.substr(0, kMostName);
+  if (place.room == Room::Definition && key == "scope") draft_.scope = value.substr(0, kMostName);
   if ((place.room == Room::Body || place.room == Room::Values) && key == "storage")
     draft_.values.storage = value.substr(0, kMostName);
 }
@@ -196,10 +202,13 @@ void HoudiniOutline::keepAttribute() {
   drafts_.push_back(std::move(draft_));
 }
 
+bool HoudiniOutline::hasMetadata(const std::string& name) const {
+  return std::any_of(metadata_.begin(), metadata_.end(), [&](const Metadata& m) { return m.name == name; });
+}
+
 void HoudiniOutline::keepGlobal() {
   const std::string& name = draft_.name;
-  const bool known = std::any_of(metadata_.begin(), metadata_.end(), [&](const Metadata& m) { return m.name == name; });
-  if (name.empty() || known || draft_.scope != "public" || metadata_.size() >= kMostAttributes) return;
+  if (name.empty() || hasMetadata(name) || draft_.scope != "public" || metadata_.size() >= kMostAttributes) return;
   const std::optional<NumberType> type = storageNamed(draft_.values.storage);
   if (draft_.type == "string" && draft_.texts == 1) metadata_.push_back(Metadata::text("", name, draft_.firstText));
   if (draft_.type != "numeric" || !type || draft_.numbers.empty() || draft_.numbers.size() > kMostGlobalNumbers) return;
@@ -209,7 +218,7 @@ void HoudiniOutline::keepGlobal() {
   metadata_.push_back({"", name, static_cast<std::int32_t>(*type), std::move(bytes)});
 }
 
-HoudiniAttribute HoudiniOutline::checked(const Draft& draft, std::uint64_t mostBytes) const {
+HoudiniAttribute HoudiniOutline::checked(const Draft& draft, std::uint64_t& mostBytes) const {
   const auto need = [&](bool holds, const char* what, const std::string& expected, const std::string& got) {
     if (!holds)
       throw InputError(path_, fmt::format("point attribute {}: {}", shown(draft.name), what), expected, got,
@@ -224,8 +233,9 @@ HoudiniAttribute HoudiniOutline::checked(const Draft& draft, std::uint64_t mostB
   need(values.order != HoudiniValues::Order::None, "values", "tuples, arrays or rawpagedata", "none of them");
   const Channel channel{draft.name, *type, static_cast<std::uint32_t>(values.size)};
   need(points() <= mostBytes / channel.bytes(), "values",
-       fmt::format("{} bytes at most, for a file of this size", mostBytes),
+       fmt::format("{} bytes at most, for what is left of a file of this size", mostBytes),
        fmt::format("{} points of {} bytes", points_, channel.bytes()));
+  mostBytes -= points() * channel.bytes();
   if (values.order != HoudiniValues::Order::Pages) {
     values.packing.clear(), values.constantPages.clear();
     return {channel, std::move(values)};
@@ -256,6 +266,10 @@ void HoudiniOutline::finish(std::uint64_t mostBytes) {
   if (points_ < 0)
     throw InputError(path_, "pointcount", "a number ≥ 0", points_ == -1 ? "none" : fmt::format("{}", points_),
                      "this is JSON, but no Houdini geometry");
+  // Where nothing is held against it, the file may say any number.
+  if (points_ > 0 && drafts_.empty())
+    throw InputError(path_, "pointattributes", fmt::format("numbers of {} points", points_), "none",
+                     "P is missing, which all geometry has");
   for (const Draft& draft : drafts_) {
     for (const HoudiniAttribute& other : attributes_)
       if (other.channel.name == draft.name)

@@ -43,8 +43,8 @@ class HoudiniOutline : public JsonEvents {
   /// `path` begins every message.
   explicit HoudiniOutline(std::string path) : path_(std::move(path)) {}
 
-  /// To be called at the file's end. Throws InputError where there is no number of points, where an attribute's values
-  /// do not fit together, and where its numbers would be more than `mostBytes`.
+  /// To be called at the file's end. Throws InputError where there is no number of points or nothing that they have,
+  /// where an attribute's values do not fit together, and where all numbers would be more than `mostBytes`.
   void finish(std::uint64_t mostBytes);
 
   const std::string& version() const { return version_; }  ///< "16.5.268"
@@ -57,8 +57,8 @@ class HoudiniOutline : public JsonEvents {
   void endArray() override;
   bool beginMap() override;
   void endMap() override { rooms_.pop_back(); }
-  void key(std::string& name) override { rooms_.back().key = name; }
-  void text(std::string& value) override;
+  void key(const std::string& name) override { rooms_.back().key = shortened(name); }
+  void text(const std::string& value) override;
   void integer(std::int64_t value) override;
   void real(double value) override;
   void boolean(bool value) override;
@@ -98,6 +98,9 @@ class HoudiniOutline : public JsonEvents {
     std::vector<double> numbers;  ///< of a global one
   };
 
+  /// Keys that are known are short: a text that is referred to again and again is not copied whole each time.
+  static std::string shortened(const std::string& key);
+
   void arrive();
   Room roomOf(const Place& parent) const;
   void enterValues(std::uint64_t begin, HoudiniValues::Order order);
@@ -107,7 +110,9 @@ class HoudiniOutline : public JsonEvents {
   void addNumber(double value);
   void keepAttribute();
   void keepGlobal();
-  HoudiniAttribute checked(const Draft& draft, std::uint64_t mostBytes) const;
+  bool hasMetadata(const std::string& name) const;
+  /// Its bytes are taken from `mostBytes`.
+  HoudiniAttribute checked(const Draft& draft, std::uint64_t& mostBytes) const;
 
   std::string path_, version_;
   std::int64_t points_ = -1;

@@ -94,12 +94,13 @@ class BinaryJson {
     if (size != 2 && size != 4 && size != 8) fail("a length", fmt::format("byte 0x{:02x}", first));
     return number(size);
   }
-  std::string text() {
+  /// The next one; it holds until the one behind it.
+  const std::string& text() {
     const std::uint64_t size = length();
     if (size > kMostText) fail(fmt::format("a text of {} bytes at most", kMostText), fmt::format("{}", size));
-    std::string value(size, '\0');
-    if (file_.read(reinterpret_cast<std::byte*>(value.data()), size) != size) failAtEnd();
-    return value;
+    text_.resize(size);
+    if (file_.read(reinterpret_cast<std::byte*>(text_.data()), size) != size) failAtEnd();
+    return text_;
   }
   const std::string& definedText() {
     const std::uint64_t id = length();
@@ -117,10 +118,10 @@ class BinaryJson {
       const int t = byte();
       if (t == kTextDef) {
         const std::uint64_t id = length();
-        std::string value = text();
+        const std::string& value = text();
         textBytes_ += value.size() + kTextCost;
         if (textBytes_ > kMostTexts) fail(fmt::format("texts of {} bytes in all", kMostTexts), "more");
-        texts_[id] = std::move(value);
+        texts_[id] = value;
       } else if (t == kTextUndef) {
         texts_.erase(length());
       } else {
@@ -145,7 +146,7 @@ class BinaryJson {
   /// A key, whose token has been read, and the beginning of its value.
   void pair(int t) {
     if (t != kText && t != kTextRef) fail("a text as key", fmt::format("token 0x{:02x}", t));
-    std::string name = t == kText ? text() : definedText();
+    const std::string& name = t == kText ? text() : definedText();
     if (told()) events_.key(name);
     begin(token());
   }
@@ -167,7 +168,7 @@ class BinaryJson {
       default: return scalar(t);
     }
   }
-  void textValue(std::string value) {
+  void textValue(const std::string& value) {
     if (told()) events_.text(value);
   }
   void boolean(bool value) {
@@ -197,7 +198,7 @@ class BinaryJson {
       wanted ? run(*type, count) : skip(count, numberSize(*type));
     else if (t == kText || t == kTextRef)
       for (std::uint64_t k = 0; k < count; ++k) {
-        std::string value = t == kText ? text() : definedText();
+        const std::string& value = t == kText ? text() : definedText();
         if (wanted) events_.text(value);
       }
     else
@@ -230,6 +231,7 @@ class BinaryJson {
   std::size_t skippedFrom_ = 0;  ///< so many are open where stepping over began; 0: nothing is stepped over
   std::unordered_map<std::uint64_t, std::string> texts_;
   std::uint64_t textBytes_ = 0;
+  std::string text_;  ///< the last that stood in the file
   std::vector<std::byte> block_;
 };
 

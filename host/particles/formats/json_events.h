@@ -20,8 +20,8 @@ class JsonEvents {
   /// As beginArray.
   virtual bool beginMap() = 0;
   virtual void endMap() = 0;
-  virtual void key(std::string& name) = 0;
-  virtual void text(std::string& value) = 0;
+  virtual void key(const std::string& name) = 0;
+  virtual void text(const std::string& value) = 0;
   virtual void integer(std::int64_t value) = 0;
   virtual void real(double value) = 0;
   virtual void boolean(bool value) = 0;
