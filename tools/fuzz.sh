@@ -36,10 +36,11 @@ mkdir -p "$build/findings"
 
 # Learns into build/, from there and from what is committed.
 run() {
-  local learnt=$build/corpus/$1
+  local learnt=$build/corpus/$1 known=()
   mkdir -p "$learnt"
+  if [[ -d tests/fuzz/corpus/$1 ]]; then known=("tests/fuzz/corpus/$1"); fi # a new target has none
   "$build/tests/fuzz/fuzz_$1" "${limits[@]}" -max_total_time="$seconds" -print_final_stats=1 \
-    -artifact_prefix="$build/findings/$1-" "$learnt" "tests/fuzz/corpus/$1" >"$build/$1.log" 2>&1
+    -artifact_prefix="$build/findings/$1-" "$learnt" "${known[@]}" >"$build/$1.log" 2>&1
 }
 
 # A line for one that has ended, and its log's end where it found something.

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes tests/fuzz/corpus/ anew: of what is there, what the readers' own tests write (good files and hostile ones), the
-# scenes of scenes/ and what tools/fuzz.sh has learnt, the least that reaches the same code.
+# scenes of scenes/ and what tools/fuzz.sh has learnt, as little as reaches the same code, and of that 64 files.
 # tests/fuzz/make_corpus.sh [TARGET...]   Needs the presets dev, for the tests, and fuzz; TESTS names a folder of built ones.
 set -euo pipefail
 cd -- "$(dirname -- "${BASH_SOURCE[0]}")/../.."
@@ -14,7 +14,7 @@ declare -A writers=(
 )
 targets=("$@")
 if [[ $# -eq 0 ]]; then mapfile -t targets < <(printf '%s\n' "${!writers[@]}" | sort); fi
-most_bytes=20000 # of a target's corpus: 300 kB all together
+most_bytes=20000 most_files=64 # of a target's corpus: 300 kB all together
 
 build=build/fuzz
 tests=${TESTS:-build/dev/tests}
@@ -35,7 +35,7 @@ for target in "${targets[@]}"; do
   done
   if [[ $target == scene ]]; then find scenes -name '*.json' ! -name '*.schema.json' -exec cp -t "$seeds" -- {} +; fi
 
-  # Smallest first, so that small files stand for what large ones reach too; edges count, not how often.
+  # Edges count, not how often they are taken.
   rm -rf "$build/merged"
   mkdir "$build/merged"
   ASAN_OPTIONS=quarantine_size_mb=16 "$fuzzer" -merge=1 -use_counters=0 -max_len=4096 \
@@ -43,11 +43,12 @@ for target in "${targets[@]}"; do
   bytes=0
   rm -rf "$corpus"
   mkdir "$corpus"
-  while read -r size name; do
-    if ((bytes + size > most_bytes)); then break; fi
-    bytes=$((bytes + size))
+  files=0
+  while read -r name size; do # a fair choice of small and large: names are hashes
+    if ((files == most_files || bytes + size > most_bytes)); then continue; fi
+    bytes=$((bytes + size)) files=$((files + 1))
     cp "$build/merged/$name" "$corpus/"
-  done < <(find "$build/merged" -type f -printf '%s %f\n' | sort -n)
+  done < <(find "$build/merged" -type f -printf '%f %s\n' | sort)
   printf '%-8s %5d seeds, %3d files of %d bytes are kept\n' "$target" "$(find "$seeds" -type f | wc -l)" \
     "$(find "$corpus" -type f | wc -l)" "$bytes"
 done
