@@ -54,7 +54,7 @@ struct ConversionReport {
 /// Throws InputError where an input has none of an asked channel, or lacks one that cannot be made up (Position,
 /// Radius, ID, Absorption); where arities differ, or the path cannot be written; and as readers and writers do. Then
 /// nothing is written. Inputs must be none of the path (callers check).
-/// Memory: that of readBlocks (block_reader.h), some 20 MB more, and 8 bytes a particle for a sub-sample by ID.
+/// Memory: that of readBlocks (block_reader.h), some 10 MB more, and 8 bytes a particle for a sub-sample by ID.
 ConversionReport convertParticles(std::span<const std::unique_ptr<ParticleFile>> inputs, const std::string& path,
                                   const ConversionOptions& options);
 

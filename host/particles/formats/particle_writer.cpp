@@ -21,7 +21,7 @@ namespace mote {
 namespace {
 
 /// Rows that are put together at once: enough for all threads to share, little beside the particles.
-constexpr std::size_t kSliceBytes = std::size_t{16} << 20;
+constexpr std::size_t kSliceBytes = std::size_t{4} << 20;
 constexpr std::size_t kGrain = 1 << 13;
 
 /// A format that is written. A new one is a file beside this one, and a line here.

@@ -84,8 +84,8 @@ PrtReader::PrtReader(std::string path, WhatIsWrong* salvage) : ParticleFile(path
 
 void PrtReader::countWhole(WhatIsWrong& wrong, bool countKnown) {
   const std::size_t size = header_.particleBytes;
-  const std::size_t perBlock = std::max<std::size_t>(1, kBlockBytes / size);
-  std::vector<std::byte> block(perBlock * size);
+  constexpr std::size_t kAtOnce = 1 << 16;
+  std::vector<std::byte> block(kAtOnce);
   file_.seek(dataBegin_);
   PrtInflater stream(file_);
   std::uint64_t bytes = 0;
@@ -135,7 +135,7 @@ void PrtReader::read(std::span<const ChannelRequest> requests) const {
       if (begun == count) return flow.stop(), nullptr;
       Block& block = ring[turn++ % kBlocksInFlight];
       block.particles = static_cast<std::size_t>(std::min<std::uint64_t>(perBlock, count - begun));
-      block.bytes.resize(perBlock * size);
+      block.bytes.resize(block.particles * size);
       const std::size_t got = stream.fill(block.bytes.data(), block.particles * size);
       if (got < block.particles * size && stream.damaged()) throwDamaged(*this, stream);
       if (got < block.particles * size) throwTruncated(*this, stream, begun * size + got);
