@@ -17,6 +17,15 @@ if(MOTE_HDF5)
   pkg_check_modules(HDF5 REQUIRED IMPORTED_TARGET hdf5-serial)
 endif()
 
+# OpenVDB's own find module demands Boost's libraries too, which it was built with and we do not use.
+if(MOTE_OPENVDB OR MOTE_PEERS)
+  find_path(OPENVDB_INCLUDE openvdb/openvdb.h REQUIRED)
+  find_library(OPENVDB_LIBRARY openvdb REQUIRED)
+  add_library(OpenVDB::openvdb UNKNOWN IMPORTED)
+  set_target_properties(OpenVDB::openvdb PROPERTIES IMPORTED_LOCATION ${OPENVDB_LIBRARY}
+    INTERFACE_INCLUDE_DIRECTORIES ${OPENVDB_INCLUDE} INTERFACE_LINK_LIBRARIES TBB::tbb)
+endif()
+
 if(MOTE_FUZZ)
   return() # what follows reads neither particles nor scenes
 endif()
@@ -32,12 +41,3 @@ pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
 find_file(VOLK_SOURCE volk.c PATHS /usr/include REQUIRED)
 add_library(volk STATIC ${VOLK_SOURCE})
 target_link_libraries(volk PUBLIC Vulkan::Headers ${CMAKE_DL_LIBS})
-
-# OpenVDB's own find module demands Boost's libraries too, which it was built with and we do not use.
-if(MOTE_OPENVDB OR MOTE_PEERS)
-  find_path(OPENVDB_INCLUDE openvdb/openvdb.h REQUIRED)
-  find_library(OPENVDB_LIBRARY openvdb REQUIRED)
-  add_library(OpenVDB::openvdb UNKNOWN IMPORTED)
-  set_target_properties(OpenVDB::openvdb PROPERTIES IMPORTED_LOCATION ${OPENVDB_LIBRARY}
-    INTERFACE_INCLUDE_DIRECTORIES ${OPENVDB_INCLUDE} INTERFACE_LINK_LIBRARIES TBB::tbb)
-endif()

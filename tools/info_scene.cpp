@@ -155,7 +155,7 @@ double pixelBytes(const MemoryFacts& f, const Output& output) {
 }
 
 MemoryNeed memoryNeed(const MemoryFacts& f, const Scene& scene) {
-  constexpr double kProgram = 20e6;  // code, libraries, threads
+  constexpr double kProgram = 50e6;  // code, libraries (30 MB are OpenVDB's tables), threads
   const double channels = f.absorption ? 3 : 1;
   const double lighting = f.share * (f.cellNodes + 16 + 4 * channels) + 4 + 4 * channels +  // tree, order, result
                           (f.sampled() ? 16 + 4 : 0);

@@ -1,5 +1,5 @@
 // Preloaded into tests by make_corpus.sh: what they have written is copied into the folder $KEEP_FILES before it is
-// removed. Files of at most 16 KiB, each content once.
+// removed. Files of at most 64 KiB, each content once.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 static void keep(int folder, const char* name) {
-  char bytes[(1 << 14) + 1], path[4096];
+  char bytes[(1 << 16) + 1], path[4096];
   const char* to = getenv("KEEP_FILES");
   struct stat facts;
   if (!to || fstatat(folder, name, &facts, AT_SYMLINK_NOFOLLOW) != 0 || !S_ISREG(facts.st_mode)) return;
