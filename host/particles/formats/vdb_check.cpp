@@ -2,6 +2,7 @@
 
 #include <blosc.h>
 #include <fmt/format.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -12,6 +13,7 @@
 #include <optional>
 #include <set>
 #include <string_view>
+#include <vector>
 
 #include "host/core/error.h"
 #include "host/particles/formats/input_file.h"
@@ -150,7 +152,7 @@ class TreeCheck {
   void values() {
     for (std::size_t leaf = 0; leaf < leaves_; ++leaf) {
       const Mask<kLeafValues> active(cursor_, "a leaf's mask");
-      compressedValues(active);
+      compressedValues(active, false);
     }
   }
 
@@ -169,7 +171,7 @@ class TreeCheck {
   void node(const Child& child) {
     const Mask<Values> children(cursor_, "a node's children"), active(cursor_, "a node's mask");
     if (children.overlaps(active)) cursor_.fail("a node's masks", "a tile or a child", "both");
-    compressedValues(active);
+    compressedValues(active, true);
     for (std::size_t left = children.count(); left > 0; --left) child();
   }
   void leafTopology() {
@@ -177,8 +179,9 @@ class TreeCheck {
     ++leaves_;
   }
 
+  /// `unpack`: tries it out. A node in which OpenVDB fails to is one that it loses the memory of.
   template <std::size_t Values>
-  void compressedValues(const Mask<Values>& active) {
+  void compressedValues(const Mask<Values>& active, bool unpack) {
     // What stands for inactive values: 0 to 2 none; 1, 4, 5 values; 3 to 5 a mask; 6 all are stored.
     const auto kind = cursor_.number<std::uint8_t>("a node's values");
     if (kind > 6) cursor_.fail("a node's values", "a kind of 0 to 6", fmt::format("{}", kind));
@@ -186,10 +189,10 @@ class TreeCheck {
     if (kind >= 3 && kind <= 5) cursor_.take(Values / 8, "mask of inactive values");
     const std::size_t stored = (compression_ & kVdbActiveMask) && kind != 6 ? active.count() : Values;
     if (half_ && stored == 0) return;
-    chunk(stored * storedBytes_);
+    chunk(stored * storedBytes_, unpack);
   }
   /// Numbers that unpack to so many bytes.
-  void chunk(std::uint64_t bytes) {
+  void chunk(std::size_t bytes, bool unpack) {
     if ((compression_ & (kVdbZip | kVdbBlosc)) == 0) {
       cursor_.take(bytes, "values");
       return;
@@ -201,10 +204,26 @@ class TreeCheck {
       cursor_.take(bytes, "values");
       return;
     }
-    const std::byte* data = cursor_.take(static_cast<std::uint64_t>(size), "packed values");
-    if ((compression_ & kVdbBlosc) == 0) return;  // zlib stops at the end of either buffer
-    if (const std::size_t unpacked = bloscBytes(cursor_, data, static_cast<std::size_t>(size)); unpacked != bytes)
-      cursor_.fail("packed values", fmt::format("{} bytes", bytes), fmt::format("{}", unpacked));
+    const auto packed = static_cast<std::size_t>(size);
+    const std::byte* data = cursor_.take(packed, "packed values");
+    const bool blosc = (compression_ & kVdbBlosc) != 0;  // zlib stops at the end of either buffer
+    std::size_t unpacked = blosc ? bloscBytes(cursor_, data, packed) : bytes;
+    if (unpacked == bytes && unpack) {
+      unpacked_.resize(bytes);
+      unpacked = blosc ? bloscUnpacked(data) : zlibUnpacked(data, packed);
+    }
+    if (unpacked != bytes) cursor_.fail("packed values", fmt::format("{} bytes", bytes), fmt::format("{}", unpacked));
+  }
+  /// Bytes that were unpacked into unpacked_; 0: it failed.
+  std::size_t bloscUnpacked(const std::byte* from) {
+    const int bytes = blosc_decompress_ctx(from, unpacked_.data(), unpacked_.size(), 1);
+    return static_cast<std::size_t>(std::max(bytes, 0));
+  }
+  std::size_t zlibUnpacked(const std::byte* from, std::size_t size) {
+    uLongf bytes = unpacked_.size();
+    const int status =
+        uncompress(reinterpret_cast<Bytef*>(unpacked_.data()), &bytes, reinterpret_cast<const Bytef*>(from), size);
+    return status == Z_OK ? bytes : 0;
   }
 
   Cursor cursor_;
@@ -212,6 +231,7 @@ class TreeCheck {
   bool half_, points_;
   std::uint32_t compression_;
   std::size_t leaves_ = 0;
+  std::vector<std::byte> unpacked_;
 };
 
 // ---- points ----
