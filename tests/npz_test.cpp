@@ -249,6 +249,8 @@ TEST(NpzReader, SaysWhatItDoesNotRead) {
   expectFileRefused(npz({{"P.npy", kPlaces, {.flags = 1}}}), {"'P.npy'", "encrypted"});
   expectFileRefused(npz({{"a.npy", column("|O", "\x80\x04.")}}), {"positions", "'a' (2, type '|O')", "objects"});
   expectFileRefused(npz({{"a.npy", kRadii}}), {"N × 3", "'a' (2)"});
+  expectFileRefused(npz({{"P.npy", npy(dictionary("'<f2'", "(1, 0)"), "")}}), {"N × 3", "'P' (1 × 0)"});
+  expectFileRefused(npz({{"x.npy", npy(dictionary("'<f2'", "(1, 0)"), "")}}), {"N × 3", "'x' (1 × 0)"});
   expectFileRefused(npz({{"P.npy", kPlaces}, {"P.npy", kPlaces}}), {"different names", "'P' twice"});
   expectFileRefused(npz({{"P.npy", npy(dictionary("'<f4'", "(2, 3)"), "", 4)}}), {"'P.npy'", "NPY version", "4.0"});
 }

@@ -181,6 +181,10 @@ const NpzReader::Array& NpzReader::positions() const {
   if (const Array* array = first([](const Array& a) { return isPoints(a.header); })) return *array;
   if (const Array* array = first([](const Array& a) { return a.header.structured && a.header.shape.size() == 1; }))
     return *array;
+  refusePositions();
+}
+
+void NpzReader::refusePositions() const {
   std::string has;
   for (const Array& a : arrays_)
     has += fmt::format("{}'{}' ({}{})", has.empty() ? "" : ", ", a.name, shapeText(a.header),
@@ -220,6 +224,8 @@ void NpzReader::takeTables() {
                                         0);
     }
   }
+  if (std::all_of(arrays_.begin(), arrays_.end(), [](const Array& a) { return a.table.channels.empty(); }))
+    refusePositions();
   std::erase_if(metadata_, [&](const Metadata& m) {
     return std::any_of(arrays_.begin(), arrays_.end(),
                        [&](const Array& a) { return a.name == m.name && !a.table.channels.empty(); });

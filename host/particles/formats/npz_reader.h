@@ -50,6 +50,7 @@ class NpzReader : public ParticleFile {
 
   void openArrays();
   const Array& positions() const;
+  [[noreturn]] void refusePositions() const;
   void takeTables();
   void setChannels();
   void keepMetadata(ZipStream& stream, const Array& array);
