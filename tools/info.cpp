@@ -36,7 +36,8 @@ Kind kindOf(const std::string& path) {
   if (isParticleFile(path)) return Kind::Particles;
   if (std::memcmp(start, kExrMagic, sizeof kExrMagic) == 0) return Kind::Picture;
   const fs::path extension = fs::path(path).extension();
-  for (const char* name : {".prt", ".npy", ".ply", ".csv", ".bgeo", ".vtk"})
+  for (const char* name : {".prt", ".npy", ".npz", ".ply", ".csv", ".geo", ".bgeo", ".vtk", ".vtu", ".vtp", ".hdf5",
+                           ".h5", ".vdb", ".nvdb"})
     if (extension == name) return Kind::Particles;
   if (extension == ".exr") return Kind::Picture;
   if (extension == ".json") return Kind::Scene;

@@ -127,6 +127,30 @@ TEST(BenchCommand, ScalingHoldsEveryCloudAgainstTheSmallest) {
   }
 }
 
+TEST(BenchCommand, FormatsAreHeldAgainstBareNumbers) {
+  const TempFolder folder;
+  const std::string report = folder.file("report.json"), csv = folder.file("more.csv");
+  writeBytes(csv, "x,y,z,Density\n1,2,3,0.5\n4,5,6,0.25\n");
+  const ProcessResult result =
+      mote({"bench", "formats", csv, "--count", "3000", "--runs", std::to_string(kRuns), "--report", report},
+           kWithoutVulkan);
+  ASSERT_EQ(result.exitCode, 0) << result.out << result.err;
+  const Json root = readJson(report);
+  ASSERT_EQ(root["runs"].size(), 7u + 7u + 1u);  // written, read, and the file that was named
+  for (const Json& run : root["runs"]) {
+    EXPECT_EQ(run["check"]["passed"], true) << run;
+    EXPECT_EQ(run["unit"], "bytes of numbers");
+    EXPECT_EQ(run["count"], run == root["runs"].back() ? 2 * 32 : 3000 * 24) << run;
+    expectBothTimed(run);
+  }
+  EXPECT_TRUE(contains(root["runs"].back()["name"].get<std::string>(), csv));
+  EXPECT_EQ(folder.entries().size(), 2u);
+
+  const ProcessResult missing = mote({"bench", "formats", folder.file("none.prt"), "--count", "100"}, kWithoutVulkan);
+  EXPECT_EQ(missing.exitCode, 2);
+  EXPECT_TRUE(contains(missing.err, "none.prt"));
+}
+
 TEST(BenchCommand, LeavesTheDevicesHalvesOutWhereThereIsNone) {
   const TempFolder folder;
   const std::string report = folder.file("report.json");

@@ -22,10 +22,13 @@ struct Benchmark {
   const char *name, *about, *unit;
   std::uint64_t count;  ///< default, which the floors are for
   void (*run)(Bench&);
+  const char* files = nullptr;  ///< what it takes files for; null: it takes none
 };
 constexpr Benchmark kBenchmarks[] = {
     {"figures", "Figures 22 to 25 and 31 of the thesis, stage by stage, on the CPU and on the device",
      "particles in the largest cloud, the other clouds and the pictures in proportion", kFiguresCount, benchFigures},
+    {"formats", "Reading and writing particle files against their bare numbers", "particles", 1'000'000, benchFormats,
+     "More particle files, of any format, to be read"},
     {"frame", "A frame from PRT file to EXR picture, on the CPU and on the device",
      "particles, a third of them for sub-sampling, the picture in proportion", kFrameCount, benchFrame},
     {"lighting", "Build of the octree, and lighting on TBB against the compute shader", "particles", 1'000'000,
@@ -224,6 +227,7 @@ void addBenchCommand(CLI::App& app, const CommonOptions& common, int& exitCode) 
     command->add_option("--runs", options->runs, fmt::format("Timed runs of each; {} by default", options->runs))
         ->type_name("K")
         ->check(CLI::Range(1, kMostRuns).description(""));
+    if (benchmark.files) command->add_option("files", options->files, benchmark.files)->type_name("FILE");
     command->add_option("--report", options->report, "Write the seconds and ratios as JSON")->type_name("OUT.json");
     command->callback([options, &benchmark, &common, &exitCode] {
       Bench run(benchmark.name, *options, common);

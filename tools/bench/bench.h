@@ -19,9 +19,10 @@
 namespace mote {
 
 struct BenchOptions {
-  std::uint64_t count = 0;  ///< particles or pairs
-  int runs = 5;             ///< timed runs of each contender, ≥ 1, after one that is not counted
-  std::string report;       ///< JSON file; empty: none
+  std::uint64_t count = 0;              ///< particles or pairs
+  int runs = 5;                         ///< timed runs of each contender, ≥ 1, after one that is not counted
+  std::string report;                   ///< JSON file; empty: none
+  std::vector<std::string> files = {};  ///< more inputs, of benchmarks that take some
 };
 
 /// One way of doing it. `work` leaves its result where the check looks for it.
@@ -91,6 +92,7 @@ class Bench {
   Bench(const std::string& name, const BenchOptions& options, const CommonOptions& common);
 
   std::uint64_t count() const { return options_.count; }
+  const std::vector<std::string>& files() const { return options_.files; }
   /// Null where there is none.
   const Device* device() const { return gpu_ ? &gpu_->device() : nullptr; }
   Gpu* gpu() const { return gpu_.get(); }
@@ -121,10 +123,11 @@ class Bench {
   std::vector<Floor> floors_;
 };
 
-// Each runs one of `mote bench …`: the thesis' figures, a whole frame from file to file, lighting and octree, time per
-// particle against particles, the bitonic sort, the splat pass.
+// Each runs one of `mote bench …`: the thesis' figures, reading and writing of particle files, a whole frame from file
+// to file, lighting and octree, time per particle against particles, the bitonic sort, the splat pass.
 constexpr std::uint64_t kFiguresCount = 4'000'000, kFrameCount = 9'000'000;  // of full size
 void benchFigures(Bench& bench);
+void benchFormats(Bench& bench);
 void benchFrame(Bench& bench);
 void benchLighting(Bench& bench);
 void benchScaling(Bench& bench);

@@ -6,17 +6,16 @@
 // renders once more; their pictures must equal each other by crosscheck's limits, as both take the same method at the
 // same fineness. With sub-sampling both are exact.
 #include <cmath>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "host/core/error.h"
-#include "host/core/output_file.h"
 #include "host/core/parallel.h"
 #include "host/core/timer.h"
 #include "host/image/exr.h"
 #include "host/particles/formats/prt_writer.h"
 #include "host/particles/generate.h"
 #include "tools/bench/bench_picture.h"
+#include "tools/bench/scratch_file.h"
 #include "tools/render.h"
 
 namespace mote {
@@ -32,23 +31,6 @@ struct Share {
   double thesisSeconds;
 };
 constexpr Share kShares[] = {{1, 10.4}, {0.5f, 5.5}, {0.1f, 3.5}};
-
-std::string temporaryFolder() {
-  std::error_code error;
-  const std::filesystem::path folder = std::filesystem::temp_directory_path(error);
-  if (error) throw MachineError(fmt::format("there is no folder for temporary files (TMPDIR): {}", error.message()));
-  return folder.string();
-}
-
-/// A file among the system's temporary ones that is gone after this, or after a signal: an OutputFile never committed.
-class ScratchFile {
- public:
-  explicit ScratchFile(const std::string& name) : file_(temporaryFolder() + "/" + name) {}
-  const std::string& path() const { return file_.temporaryPath(); }
-
- private:
-  OutputFile file_;
-};
 
 void writeCloud(const ScratchFile& file, std::uint64_t count) {
   writePrt(file.path(), columnsOf(generateParticles(Generator::Cloud, count, 0, 1)));
