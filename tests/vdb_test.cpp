@@ -369,6 +369,18 @@ void expectFlippedBitsSurvived(const std::string& whole, const VolumeSampling& s
   EXPECT_GT(refused, flipped / 10);
 }
 
+/// OpenVDB loses the memory of a node whose values it cannot unpack (which only a leak checker sees).
+TEST(VdbReader, TriesOutPackedValuesOfNodes) {
+  for (const auto& [compression, magic] : {std::pair<std::uint32_t, std::string>(io::COMPRESS_ZIP, "\x78\x9c"),
+                                           std::pair<std::uint32_t, std::string>(io::COMPRESS_BLOSC, "\x02\x01")}) {
+    std::string bytes = vdb({fog()}, compression);
+    const std::size_t packed = bytes.find(magic, bytes.find("Tree_float_5_4_3") + 64);
+    ASSERT_NE(packed, std::string::npos);
+    bytes.replace(packed + (magic[0] == 2 ? 20 : 2), 4, "\xff\xff\xff\xff");
+    expectFileRefused(bytes, {"packed values at byte", "the file is damaged"});
+  }
+}
+
 TEST(VdbReader, SurvivesFlippedBitsInVolumes) {
   const auto half = fog();
   half->setSaveFloatAsHalf(true);

@@ -9,7 +9,7 @@
 //
 // This suits hardware: a kernel is loaded once for 64 multiply-adds on sums in registers, strands go by subgroups,
 // thousands of them at once; stores are side by side; there is no atomic, shared memory or barrier of a workgroup, so
-// sums are always in the same order. (So it should; it was measured on lavapipe alone.)
+// sums are always in the same order. On an H100 it is the host's share that takes the time (docs/performance.md).
 #pragma once
 #include <tbb/enumerable_thread_specific.h>
 
