@@ -1,8 +1,9 @@
 #include "engine/passes/grid_blocks.h"
 
 #include <algorithm>
-#include <cmath>
+#include <limits>
 
+#include "host/core/error.h"
 #include "host/core/parallel.h"
 
 namespace mote {
@@ -12,26 +13,12 @@ constexpr layout::uint kBlocks = layout::kTileBlocks * layout::kTileBlocks;
 static_assert(kTileCells + 1 <= layout::kBlockEdge * layout::kTileBlocks);
 static_assert(kGroupBins == layout::kBlockBins);
 
-/// Nodes: the device may round in another way than what says which a kernel covers.
-constexpr float kSlack = 1e-3f;
-
-/// Nodes from lo to hi, within the tile; none where hi < lo. By casts: this is asked for every particle, and rounding
-/// is a function's call where the machine's oldest instructions are all there is.
-struct Nodes {
-  int lo, hi;
-  Nodes(float from, float to) {
-    const float low = std::clamp(from, 0.0f, float{kTileCells + 1}), high = std::clamp(to, -1.0f, float{kTileCells});
-    lo = static_cast<int>(low), hi = static_cast<int>(high + 1) - 1;
-    lo += static_cast<float>(lo) < low ? 1 : 0;
-  }
-  Nodes(int from, int to) : lo(std::max(from, 0)), hi(std::min(to, kTileCells)) {}
-  bool empty() const { return lo > hi; }
-  std::uint32_t firstBlock() const { return static_cast<std::uint32_t>(lo) / layout::kBlockEdge; }
-  std::uint32_t lastBlock() const { return static_cast<std::uint32_t>(hi) / layout::kBlockEdge; }
-};
-
 /// Group by number among those that the tile has; < 0: left out.
 int numberOf(const GridTile& tile, int group) { return tile.placeOfGroup(group) / kGroupBins - 1; }
+
+std::uint32_t kindOf(const layout::GridKernel& kernel) {
+  return kernel.c > 0 ? kEllipseKernels : kernel.c < 0 ? kCurvedKernels : kTentKernels;
+}
 
 void setReceivers(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
                   std::span<const std::uint32_t> slots, GridArrays& to) {
@@ -55,196 +42,253 @@ void setReceivers(const GridTile& tile, const Receivers& receivers, std::span<co
   }
 }
 
-/// Strands of a tile's middle are longer than those of its edge, and lavapipe gives each thread one run of workgroups:
-/// short runs are mixed, so that any part of the list takes about as long as another of its length.
-void mix(std::vector<layout::GridStrand>& strands) {
-  constexpr std::size_t kRun = layout::kTileBlocks,
-                        kStep = 79;  // a prime: every run once unless it divides their number
-  const std::size_t runs = strands.size() / kRun;
-  if (runs % kStep == 0) return;
-  const std::vector<layout::GridStrand> old = strands;
-  for (std::size_t run = 0; run < runs; ++run)
-    std::copy_n(old.begin() + static_cast<std::ptrdiff_t>(run * kStep % runs * kRun), kRun,
-                strands.begin() + static_cast<std::ptrdiff_t>(run * kRun));
-}
-
 }  // namespace
 
-GridArrays::Pieces& piecesOf(std::vector<GridArrays::Pieces>& all, const GridArrays::Pieces::Key& key) {
-  const auto before = [](const GridArrays::Pieces& a, const GridArrays::Pieces::Key& b) { return a.key < b; };
-  const auto at = std::lower_bound(all.begin(), all.end(), key, before);
-  if (at != all.end() && at->key == key) return *at;
-  return *all.insert(at, {key, {}});
-}
-
 GridCounts GridArrays::counts() const {
-  GridCounts counts{.kernels = kernels.size(),
-                    .entries = entries.size(),
-                    .blocks = blocks.size(),
-                    .table = table.size(),
-                    .receivers = receivers.size(),
-                    .stored = storedBlocks};
-  for (const Pieces& p : pieces) counts.strands += p.strands.size();
-  return counts;
+  return {.kernels = kernels.size(),
+          .entries = entries.size(),
+          .works = works.size(),
+          .strands = strands.size(),
+          .table = table.size(),
+          .receivers = receivers.size(),
+          .stored = storedBlocks};
 }
 
 void GridBlocks::setUp(GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
-                       std::span<const std::uint32_t> slots, std::uint32_t lanes, std::uint32_t mostSteps,
-                       GridArrays& to) {
+                       std::span<const std::uint32_t> slots, GridArrays& to) {
   groups_ = static_cast<std::size_t>(*std::max_element(tile.groupAt.begin(), tile.groupAt.end())) / kGroupBins;
-  weighTile(tile, scale_);
+  const std::size_t count = tile.particles.points.count, room = count + kGridBatch;
+  to.kernels.resize(room), nodes_.resize(room);
+  weighTile(tile, to.kernels.data(), nodes_.data());
+  to.kernels.resize(count);
   setKernels(tile, to);
   sortEntries(to);
-  setBlocks(tile, lanes, mostSteps, to);
+  setWorks(tile, to);
   setReceivers(tile, receivers, members, slots, to);
 }
 
 void GridBlocks::setKernels(GridTile& tile, GridArrays& to) {
   GridParticles& p = tile.particles;
   const std::size_t count = p.points.count;
-  const auto cell = static_cast<float>(tile.shape->resolution.cell);
-  const int lastGroup = tile.firstGroup + static_cast<int>(tile.groupAt.size()) - 1;
-  to.kernels.resize(count);
-  // Beyond the end: what `put` below looks at in vain.
-  start_.assign((kBlocks + layout::kTileBlocks + 2) * groups_ + 2, 0);
-  kinds_.assign(kBlocks + layout::kTileBlocks + 2, 0);
-  const auto number = static_cast<std::uint32_t>(groups_);
-  std::size_t found = 0;
   const bool colours = tile.channels > 1;
   for (std::size_t c = 0; colours && c < tile.channels; ++c) to.peaks[c].assign(p.peak[c].at(0), p.peak[c].at(count));
+  places_.resize(count);
+  MOTE_CHECK(groups_, <=, std::size_t{std::numeric_limits<std::uint16_t>::max()});
+  const auto groups = static_cast<std::uint32_t>(groups_);
+  const int lastGroup = tile.firstGroup + static_cast<int>(tile.groupAt.size()) - 1;
+  // Beyond the end: where blocks are counted that a kernel has not.
+  start_.assign((kBlocks + layout::kTileBlocks + 2) * groups_ + 4, 0);
+  std::uint32_t* const counts = start_.data() + 2;  // sortEntries
+  to.kinds = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    layout::GridKernel& kernel = to.kernels[i] = {};
-    const int window = windowOf(p, i);
-    if (window == 0) {
-      p.own[i] = 0;
-      continue;
-    }
-    const float x = p.points.x[i], y = p.points.y[i], reach = reachOf(p, i, window) + kSlack;
-    Nodes columns(x - reach, x + reach), rows(y - reach, y + reach);
-    std::uint32_t kind = window == 2 ? kTentKernels : kEllipseKernels;
-    kernel = {x, y, p.depth[i], 1.0f / p.depthRadius[i], p.a[i], p.b[i], window == 2 ? 0.0f : p.c[i], scale_[i]};
-    if (p.curved[i] > 0 || reach > kMostReach) {
-      const LoneKernel lone = weighAlone(tile, i);
-      p.own[i] = lone.own;
-      if (!(lone.scale > 0)) continue;
-      kernel.scale = lone.scale;
-      columns = Nodes(lone.firstColumn, lone.firstColumn + lone.columns - 1);
-      rows = Nodes(lone.firstRow, lone.firstRow + lone.rows - 1);
-      if (p.curved[i] > 0) kind = kCurvedKernels, kernel.a = p.curved[i] * (cell * cell), kernel.b = 0, kernel.c = -1;
-    }
-    if (!colours) kernel.scale *= p.peak[0][i];
+    const CoveredNodes nodes = nodes_[i] == kAnyNodes ? setLone(tile, i, to.kernels[i]) : CoveredNodes(nodes_[i]);
+    places_[i] = {};
     const int first = numberOf(tile, p.firstBin[i] >> 2);
-    if (first < 0 || columns.empty() || rows.empty()) continue;
-    const auto groups = static_cast<std::uint32_t>(std::min(p.lastBin[i] >> 2, lastGroup) - (p.firstBin[i] >> 2) + 1);
-    const std::uint32_t firstRow = rows.firstBlock(), rowCount = rows.lastBlock() - firstRow + 1;
-    const std::uint32_t firstColumn = columns.firstBlock(), columnCount = columns.lastBlock() - firstColumn + 1;
-    if (found + 8 + rowCount * columnCount * groups > found_.size())
-      found_.resize(2 * (found + 8 + rowCount * columnCount * groups));
-    const auto put = [&](std::uint32_t row, std::uint32_t column, std::uint32_t group, bool really) {
-      const std::uint32_t block = (firstRow + row) * layout::kTileBlocks + firstColumn + column;
-      const std::uint32_t at = block * number + static_cast<std::uint32_t>(first) + group;
-      start_[at + 2] += really;
-      kinds_[block] |= really ? kind : 0;
-      found_[found] = {at, static_cast<std::uint32_t>(i)};
-      found += really;
-    };
-    if (rowCount <= 2 && columnCount <= 2 && groups <= 2) {  // without a loop whose end is a guess
-      for (std::uint32_t k = 0; k < 8; ++k)
-        put(k >> 2, k >> 1 & 1, k & 1, (k >> 2) < rowCount && (k >> 1 & 1) < columnCount && (k & 1) < groups);
-      continue;
-    }
-    for (std::uint32_t row = 0; row < rowCount; ++row)
-      for (std::uint32_t column = 0; column < columnCount; ++column)
-        for (std::uint32_t group = 0; group < groups; ++group) put(row, column, group, true);
+    if (first < 0 || nodes.empty()) continue;
+    const auto block = [](std::int32_t node) { return static_cast<std::uint32_t>(node) / layout::kBlockEdge; };
+    const std::uint32_t row = block(nodes.firstRow), column = block(nodes.firstColumn);
+    const Place place{(row * layout::kTileBlocks + column) * groups + static_cast<std::uint32_t>(first),
+                      static_cast<std::uint16_t>(std::min(p.lastBin[i] >> 2, lastGroup) - (p.firstBin[i] >> 2) + 1),
+                      static_cast<std::uint8_t>(block(nodes.endColumn - 1) - column + 1),
+                      static_cast<std::uint8_t>(block(nodes.endRow - 1) - row + 1)};
+    places_[i] = place;
+    to.kinds |= nodes_[i] == kAnyNodes ? kindOf(to.kernels[i]) : p.half[i] > 1 ? kEllipseKernels : kTentKernels;
+    forEachBlock(place, groups, [&](std::uint32_t at, std::uint32_t really) { counts[at] += really; });
   }
-  to.entries.resize(found);
+}
+
+CoveredNodes GridBlocks::setLone(GridTile& tile, std::size_t i, layout::GridKernel& kernel) const {
+  GridParticles& p = tile.particles;
+  const int window = windowOf(p, i);
+  if (window == 0) {
+    p.own[i] = 0;
+    kernel = {};
+    return {};
+  }
+  const float reach = reachOf(p, i, window);
+  if (!(p.curved[i] > 0) && reach <= kMostReach) return {kernel.x, kernel.y, reach};
+  const LoneKernel lone = weighAlone(tile, i);
+  p.own[i] = lone.own;
+  kernel.scale = 0;
+  if (!(lone.scale > 0)) return {};
+  kernel.scale = tile.channels > 1 ? lone.scale : lone.scale * p.peak[0][i];
+  if (p.curved[i] > 0) {
+    const auto cell = static_cast<float>(tile.shape->resolution.cell);
+    kernel.a = p.curved[i] * (cell * cell), kernel.b = 0, kernel.c = -1;
+  }
+  CoveredNodes nodes;
+  nodes.firstColumn = std::max(lone.firstColumn, 0), nodes.firstRow = std::max(lone.firstRow, 0);
+  nodes.endColumn = std::min(lone.firstColumn + lone.columns, kTileCells + 1);
+  nodes.endRow = std::min(lone.firstRow + lone.rows, kTileCells + 1);
+  return nodes;
+}
+
+/// `add(at, really)` for each block and group of a place, and for some beside it, where `really` is 0: of the usual
+/// sizes always eight, as a loop whose end is a guess takes longer.
+template <class Add>
+void GridBlocks::forEachBlock(const Place& place, std::uint32_t groups, const Add& add) {
+  const std::uint32_t rowStep = layout::kTileBlocks * groups;
+  if (place.rows <= 2 && place.columns <= 2 && place.groups <= 2) {
+    const std::uint32_t here = place.groups > 0 ? 1 : 0, deep = place.groups > 1 ? 1 : 0;
+    const std::uint32_t right = place.columns > 1 ? 1 : 0, below = place.rows > 1 ? 1 : 0;
+    const std::uint32_t at = place.first, under = at + rowStep;
+    add(at, here), add(at + 1, deep);
+    add(at + groups, here & right), add(at + groups + 1, deep & right);
+    add(under, here & below), add(under + 1, deep & below);
+    add(under + groups, here & below & right), add(under + groups + 1, deep & below & right);
+    return;
+  }
+  for (std::uint32_t row = 0; row < place.rows; ++row)
+    for (std::uint32_t column = 0; column < place.columns; ++column)
+      for (std::uint32_t group = 0; group < place.groups; ++group)
+        add(place.first + row * rowStep + column * groups + group, 1u);
 }
 
 void GridBlocks::sortEntries(GridArrays& to) {
-  // Counts stand two places on, then beginnings one place on, which become ends and so the next one's beginnings.
-  start_.resize(kBlocks * groups_ + 2);
-  for (std::size_t k = 2; k < start_.size(); ++k) start_[k] += start_[k - 1];
-  for (std::size_t k = 0; k < to.entries.size(); ++k) to.entries[start_[found_[k].block + 1]++] = found_[k].kernel;
+  // Counts stand two places on; they become beginnings one place on, those ends, and so the next one's beginnings but
+  // for the gap that makes each even: shaders load two at once.
+  std::uint32_t all = 0;
+  start_[0] = 0;
+  for (std::size_t k = 0; k < kBlocks * groups_; ++k) {
+    const std::uint32_t count = start_[k + 2];
+    start_[k + 1] = all;
+    all += evenEntries(count);
+  }
+  to.entries.resize(all);
+  std::uint32_t *const next = start_.data() + 1, *const entries = to.entries.data();
+  const auto groups = static_cast<std::uint32_t>(groups_);
+  std::uint32_t nowhere = 0;
+  for (std::size_t i = 0; i < places_.size(); ++i)
+    forEachBlock(places_[i], groups, [&](std::uint32_t at, std::uint32_t really) {
+      const std::uint32_t place = next[at];
+      *(really != 0 ? entries + place : &nowhere) = static_cast<std::uint32_t>(i);
+      next[at] = place + really;
+    });
 }
 
-void GridBlocks::setBlocks(const GridTile& tile, std::uint32_t lanes, std::uint32_t mostSteps, GridArrays& to) const {
+void GridBlocks::setWorks(const GridTile& tile, GridArrays& to) const {
   std::vector<float> binOf(groups_);
   for (std::size_t k = 0; k < tile.groupAt.size(); ++k)
     if (tile.groupAt[k] >= 0)
       binOf[static_cast<std::size_t>(tile.groupAt[k] / kGroupBins - 1)] =
           static_cast<float>((tile.firstGroup + static_cast<int>(k)) * kGroupBins);
-  to.blocks.clear(), to.pieces.clear();
+  to.works.clear(), to.blocks.clear(), to.strands.clear();
   to.table.resize(kBlocks * groups_);
-  to.storedBlocks = 0;
+  to.storedBlocks = 0, to.begun = false;
   const double cell = tile.shape->resolution.cell;
   for (std::size_t b = 0; b < kBlocks; ++b) {
     const std::size_t column = b % layout::kTileBlocks * layout::kBlockEdge,
                       row = b / layout::kTileBlocks * layout::kBlockEdge;
-    layout::GridStrand strand{static_cast<layout::uint>(to.blocks.size()),
-                              0,
-                              static_cast<float>(column),
-                              static_cast<float>(row),
-                              static_cast<float>((tile.firstColumn + static_cast<double>(column)) * cell),
-                              static_cast<float>((tile.firstRow + static_cast<double>(row)) * cell)};
-    std::uint32_t round = 0, steps = 0, last = 0;
-    const auto finish = [&] {
-      strand.end = static_cast<layout::uint>(to.blocks.size());
-      if (strand.end > strand.first)
-        piecesOf(to.pieces, {round, kinds_[b], round > 0}).strands.push_back(strand), ++round;
-      strand.first = strand.end, steps = 0;
-    };
+    layout::GridWork work{};
+    work.column = static_cast<float>(column), work.row = static_cast<float>(row);
+    work.u = static_cast<float>((tile.firstColumn + static_cast<double>(column)) * cell);
+    work.v = static_cast<float>((tile.firstRow + static_cast<double>(row)) * cell);
+    const auto strand = static_cast<layout::uint>(to.works.size());
+    std::uint32_t last = 0;
     for (std::size_t g = 0; g < groups_; ++g) {
-      std::uint32_t first = start_[b * groups_ + g];
-      const std::uint32_t end = start_[b * groups_ + g + 1];
+      const std::uint32_t first = evenEntries(start_[b * groups_ + g]), end = start_[b * groups_ + g + 1];
       if (first < end) last = 2 * ++to.storedBlocks;
+      if (first < end && end % 2 != 0) to.entries[end] = to.entries[end - 1];
       const std::uint32_t entry = last + (first < end ? 1 : 0);
       to.table[g * kBlocks + b].here = entry;
       if (b > 0) to.table[g * kBlocks + b - 1].right = entry;
-      while (first < end) {
-        const std::uint32_t here = std::min({end - first, (mostSteps - steps - 1) * lanes, kMostBlockEntries});
-        to.blocks.push_back({first, first + here, to.storedBlocks, binOf[g]});
-        first += here, steps += 1 + (here + lanes - 1) / lanes;
-        if (first < end || (steps + 2 > mostSteps && g + 1 < groups_)) {
-          finish();
-          // A piece that goes on begins with the last one's block, for what is left of it, or for nothing.
-          if (first == end) to.blocks.push_back({end, end, to.storedBlocks, binOf[g]}), steps = 2;
-        }
+      work.bin = binOf[g];
+      for (work.first = first; work.first < end; work.first = work.end) {
+        work.end = std::min(end, work.first + kMostWorkEntries);
+        work.sums = static_cast<layout::uint>(to.works.size());
+        to.begun = to.begun || work.first > first;
+        to.works.push_back(work);
+        to.blocks.push_back(to.storedBlocks);
       }
     }
-    finish();
+    if (to.works.size() > strand) to.strands.push_back({strand, static_cast<layout::uint>(to.works.size()), 0});
   }
 }
 
-std::vector<GridArrays::Pieces> joinPieces(std::span<const GridArrays* const> tiles) {
-  std::vector<GridArrays::Pieces> all;
-  std::uint32_t blocks = 0;
-  for (const GridArrays* tile : tiles) {
-    for (const GridArrays::Pieces& pieces : tile->pieces) {
-      std::vector<layout::GridStrand>& to = piecesOf(all, pieces.key).strands;
-      for (layout::GridStrand strand : pieces.strands) {
-        strand.first += blocks, strand.end += blocks;
-        to.push_back(strand);
-      }
-    }
-    blocks += static_cast<std::uint32_t>(tile->blocks.size());
-  }
-  for (GridArrays::Pieces& pieces : all) mix(pieces.strands);
-  return all;
-}
+namespace {
 
-void join(std::span<const GridArrays* const> tiles, std::size_t channels, const GridTargets& to) {
-  struct Base {
-    std::uint32_t kernels = 0, entries = 0, blocks = 0, table = 0, receivers = 0, stored = 0;
-  };
+/// Where a tile's arrays begin in those of all.
+struct Base {
+  std::uint32_t kernels = 0, entries = 0, works = 0, strands = 0, table = 0, receivers = 0, stored = 0;
+};
+std::vector<Base> basesOf(std::span<const GridArrays* const> tiles) {
   std::vector<Base> bases(tiles.size());
   const auto number = [](const auto& array) { return static_cast<std::uint32_t>(array.size()); };
   for (std::size_t t = 1; t < tiles.size(); ++t) {
     const Base& last = bases[t - 1];
     const GridArrays& tile = *tiles[t - 1];
-    bases[t] = {last.kernels + number(tile.kernels),     last.entries + number(tile.entries),
-                last.blocks + number(tile.blocks),       last.table + number(tile.table),
-                last.receivers + number(tile.receivers), last.stored + tile.storedBlocks};
+    bases[t] = {last.kernels + number(tile.kernels), last.entries + number(tile.entries),
+                last.works + number(tile.works),     last.strands + number(tile.strands),
+                last.table + number(tile.table),     last.receivers + number(tile.receivers),
+                last.stored + tile.storedBlocks};
   }
+  return bases;
+}
+
+}  // namespace
+
+namespace {
+
+/// Where works of one kind go.
+struct WorkOrder {
+  std::uint32_t kinds = 0, count = 0;
+  std::vector<std::uint32_t> next = std::vector<std::uint32_t>(kMostWorkEntries + 2, 0);  ///< by number of particles
+  std::vector<std::uint32_t> runTo;
+
+  /// Once `next[k + 1]` says how many have k. Runs of `lanes` are mixed: lavapipe gives each thread one part of them.
+  void setUp(std::uint32_t lanes) {
+    constexpr std::uint32_t kStep = 79;  // a prime: every run once unless it divides their number
+    for (std::size_t k = 1; k < next.size(); ++k) next[k] += next[k - 1];
+    const std::uint32_t runs = count / lanes, step = runs % kStep == 0 ? 1 : kStep;
+    runTo.resize(runs);
+    for (std::uint32_t run = 0; run < runs; ++run)
+      runTo[static_cast<std::size_t>(std::uint64_t{run} * step % runs)] = run;
+  }
+  std::uint32_t place(const layout::GridWork& work, std::uint32_t lanes) {
+    const std::uint32_t k = next[work.end - work.first]++, run = k / lanes;
+    return run < runTo.size() ? runTo[run] * lanes + k % lanes : k;
+  }
+};
+
+}  // namespace
+
+std::vector<GridWorks> joinWorks(std::span<const GridArrays* const> tiles, std::uint32_t lanes,
+                                 std::span<layout::GridWork> to) {
+  std::vector<WorkOrder> orders;
+  const auto orderOf = [&](std::uint32_t kinds) -> WorkOrder& {
+    const auto at = std::find_if(orders.begin(), orders.end(), [&](const WorkOrder& o) { return o.kinds == kinds; });
+    if (at != orders.end()) return *at;
+    orders.emplace_back().kinds = kinds;
+    return orders.back();
+  };
+  for (const GridArrays* tile : tiles) {
+    if (tile->works.empty()) continue;
+    WorkOrder& order = orderOf(tile->kinds);
+    order.count += static_cast<std::uint32_t>(tile->works.size());
+    for (const layout::GridWork& work : tile->works) ++order.next[work.end - work.first + 1];
+  }
+  std::vector<GridWorks> all;
+  std::uint32_t begin = 0;
+  for (WorkOrder& order : orders) {
+    order.setUp(lanes);
+    all.push_back({order.kinds, begin, order.count});
+    begin += order.count;
+  }
+  const std::vector<Base> bases = basesOf(tiles);
+  for (std::size_t t = 0; t < tiles.size(); ++t) {
+    if (tiles[t]->works.empty()) continue;
+    WorkOrder& order = orderOf(tiles[t]->kinds);
+    const std::uint32_t first = all[static_cast<std::size_t>(&order - orders.data())].first;
+    for (layout::GridWork work : tiles[t]->works) {
+      work.first += bases[t].entries, work.end += bases[t].entries, work.sums += bases[t].works;
+      to[first + order.place(work, lanes)] = work;
+    }
+  }
+  return all;
+}
+
+void join(std::span<const GridArrays* const> tiles, std::size_t channels, const GridTargets& to) {
+  const std::vector<Base> bases = basesOf(tiles);
   parallelBlocks(tiles.size(), 1, [&](std::size_t t, std::size_t) {
     const GridArrays& tile = *tiles[t];
     const Base& base = bases[t];
@@ -257,10 +301,11 @@ void join(std::span<const GridArrays* const> tiles, std::size_t channels, const 
                 to.own.begin() + static_cast<std::ptrdiff_t>(c * to.receivers.size()) + base.receivers);
     }
     for (std::size_t k = 0; k < tile.entries.size(); ++k) to.entries[base.entries + k] = tile.entries[k] + base.kernels;
-    for (std::size_t k = 0; k < tile.blocks.size(); ++k) {
-      layout::GridBlock block = tile.blocks[k];
-      block.first += base.entries, block.end += base.entries, block.stored += base.stored;
-      to.blocks[base.blocks + k] = block;
+    for (std::size_t k = 0; k < tile.blocks.size(); ++k) to.blocks[base.works + k] = tile.blocks[k] + base.stored;
+    for (std::size_t k = 0; k < tile.strands.size(); ++k) {
+      layout::GridStrand strand = tile.strands[k];
+      strand.first += base.works, strand.end += base.works;  // `before` is of parts, which are alone
+      to.strands[base.strands + k] = strand;
     }
     // What lies before everything is the same block for all.
     const auto entry = [&](std::uint32_t own) { return own < 2 ? 0 : own + 2 * base.stored; };

@@ -14,6 +14,7 @@ namespace {
 constexpr std::uint64_t kBatchBytes = std::uint64_t{64} << 20;
 
 constexpr std::uint32_t kKernelTexelBytes = 16;  // half a GridKernel
+constexpr std::uint32_t kPairBytes = 8;          // two entries or sums, a GridPair, a GridEntryPair
 
 /// A buffer's elements to be filled: where it is mapped they are the buffer's own, else they are copied at the end.
 template <class T>
@@ -40,22 +41,19 @@ class Filling {
 GridDevice::GridDevice(const Device& device)
     : device_(device),
       queries_(device.createTimestampQueries(1)),
-      groupSize_(device.isCpu() ? device.subgroupSize() : std::max(64u, device.mostSubgroupSize())),
-      storeLanes_(std::min(8u, device.leastSubgroupSize())) {}
+      groupSize_(device.isCpu() ? device.subgroupSize() : std::max(64u, device.mostSubgroupSize())) {}
 
 const ComputePipeline& GridDevice::fill(const FillVariant& variant) {
   ComputePipeline& made = fills_[variant];
   if (made.handle() != VK_NULL_HANDLE) return made;
   const auto has = [&](std::uint32_t kind) { return std::uint32_t{(variant.kinds & kind) != 0}; };
   made = device_.createComputePipeline(spirv::grid_fill_comp, sizeof(layout::GridParams),
-                                       std::array<SpecializationConstant, 8>{{{0, groupSize_},
+                                       std::array<SpecializationConstant, 6>{{{0, groupSize_},
                                                                               {1, variant.falloff},
                                                                               {2, has(kTentKernels)},
                                                                               {3, has(kEllipseKernels)},
                                                                               {4, has(kCurvedKernels)},
-                                                                              {5, variant.goesOn},
-                                                                              {6, storeLanes_},
-                                                                              {7, variant.colours}}},
+                                                                              {5, variant.colours}}},
                                        2);
   return made;
 }
@@ -71,7 +69,9 @@ GridDevice::Sizes GridDevice::sizesOf(const GridCounts& counts, const Manner& ma
   return {counts.kernels * sizeof(layout::GridKernel),
           manner.colours ? manner.channels * counts.kernels * kFloat : 0,
           counts.entries * kUint,
-          counts.blocks * sizeof(layout::GridBlock),
+          counts.works * sizeof(layout::GridWork),
+          counts.works * layout::kBlockPairs * kFloat,
+          counts.works * kUint,
           counts.strands * sizeof(layout::GridStrand),
           counts.stored * layout::kBlockPairs * sizeof(layout::GridPair),
           counts.table * sizeof(layout::GridEntryPair),
@@ -80,13 +80,15 @@ GridDevice::Sizes GridDevice::sizesOf(const GridCounts& counts, const Manner& ma
 }
 
 void GridDevice::release() {
-  kernelTexels_ = {}, entryTexels_ = {};
+  kernelTexels_ = {}, entryTexels_ = {}, sumTexels_ = {}, storedTexels_ = {}, tableTexels_ = {}, receiverTexels_ = {};
   buffers_ = {};
 }
 
 bool GridDevice::texelsFit(const Sizes& sizes) const {
-  return sizes[0] / kKernelTexelBytes <= device_.mostTexels() &&
-         sizes[2] / sizeof(layout::uint) <= device_.mostTexels();
+  const std::uint64_t longest =
+      std::max({sizes[0] / kKernelTexelBytes, sizes[2] / kPairBytes, sizes[4] / kPairBytes, sizes[7] / kPairBytes,
+                sizes[8] / kPairBytes, sizes[9] / sizeof(layout::GridReceiver)});
+  return longest <= device_.mostTexels();
 }
 
 bool GridDevice::fits(const Sizes& sizes) {
@@ -110,56 +112,56 @@ void GridDevice::makeRoom(const Sizes& sizes) {
   if (!arraysFit(device_, {room.begin(), room.end()}, device_.stagingCost())) room = sizes;
   for (std::size_t k = 0; k < sizes.size(); ++k) *buffers[k] = device_.createBuffer(room[k]);
   kernelTexels_ = device_.createTexelView(buffers_.kernels, VK_FORMAT_R32G32B32A32_SFLOAT, kKernelTexelBytes);
-  entryTexels_ = device_.createTexelView(buffers_.entries, VK_FORMAT_R32_UINT, sizeof(layout::uint));
+  entryTexels_ = device_.createTexelView(buffers_.entries, VK_FORMAT_R32G32_UINT, kPairBytes);
+  sumTexels_ = device_.createTexelView(buffers_.sums, VK_FORMAT_R32G32_SFLOAT, kPairBytes);
+  storedTexels_ = device_.createTexelView(buffers_.stored, VK_FORMAT_R32G32_SFLOAT, kPairBytes);
+  tableTexels_ = device_.createTexelView(buffers_.table, VK_FORMAT_R32G32_UINT, kPairBytes);
+  receiverTexels_ =
+      device_.createTexelView(buffers_.receivers, VK_FORMAT_R32G32B32A32_UINT, sizeof(layout::GridReceiver));
   device_.upload<layout::GridPair>(buffers_.stored, std::vector<layout::GridPair>(layout::kBlockPairs));
 }
 
-std::vector<GridArrays::Pieces> GridDevice::upload(std::span<const GridArrays* const> tiles, const Sizes& sizes,
-                                                   std::size_t channels) {
+std::vector<GridWorks> GridDevice::upload(std::span<const GridArrays* const> tiles, const Sizes& sizes,
+                                          std::size_t channels) {
   const Buffers& to = buffers_;
   const Filling<layout::GridKernel> kernels(device_, to.kernels, sizes[0]);
   const Filling<float> peaks(device_, to.peaks, sizes[1]);
   const Filling<std::uint32_t> entries(device_, to.entries, sizes[2]);
-  const Filling<layout::GridBlock> blocks(device_, to.blocks, sizes[3]);
-  const Filling<layout::GridEntryPair> table(device_, to.table, sizes[6]);
-  const Filling<layout::GridReceiver> receivers(device_, to.receivers, sizes[7]);
-  const Filling<float> own(device_, to.depths, sizes[8]);
+  const Filling<std::uint32_t> blocks(device_, to.blocks, sizes[5]);
+  const Filling<layout::GridStrand> strands(device_, to.strands, sizes[6]);
+  const Filling<layout::GridEntryPair> table(device_, to.table, sizes[8]);
+  const Filling<layout::GridReceiver> receivers(device_, to.receivers, sizes[9]);
+  const Filling<float> own(device_, to.depths, sizes[10]);
   join(tiles, channels,
-       {kernels.elements, peaks.elements, entries.elements, blocks.elements, table.elements, receivers.elements,
-        own.elements});
-  kernels.finish(), peaks.finish(), entries.finish(), blocks.finish(), table.finish(), receivers.finish(), own.finish();
-  std::vector<GridArrays::Pieces> all = joinPieces(tiles);
-  std::size_t strands = 0;
-  for (const GridArrays::Pieces& pieces : all) {
-    device_.upload<layout::GridStrand>(to.strands, pieces.strands, strands);
-    strands += pieces.strands.size();
-  }
+       {kernels.elements, peaks.elements, entries.elements, blocks.elements, strands.elements, table.elements,
+        receivers.elements, own.elements});
+  kernels.finish(), peaks.finish(), entries.finish(), blocks.finish(), strands.finish(), table.finish();
+  receivers.finish(), own.finish();
+  const Filling<layout::GridWork> works(device_, to.works, sizes[3]);
+  const std::vector<GridWorks> all = joinWorks(tiles, groupSize_, works.elements);
+  works.finish();
   return all;
 }
 
 layout::GridParams GridDevice::params(double cell) const {
   const Buffers& from = buffers_;
   layout::GridParams params{};
-  params.peaks = from.peaks.address(), params.blocks = from.blocks.address();
+  params.peaks = from.peaks.address(), params.works = from.works.address(), params.sums = from.sums.address();
+  params.blocks = from.blocks.address(), params.strands = from.strands.address();
   params.stored = from.stored.address(), params.table = from.table.address();
   params.receivers = from.receivers.address(), params.depths = from.depths.address();
   params.cell = static_cast<float>(cell);
   return params;
 }
 
-void GridDevice::fillNodes(CommandBuffer& commands, std::span<const GridArrays::Pieces> all, layout::GridParams params,
+void GridDevice::fillNodes(CommandBuffer& commands, std::span<const GridWorks> all, layout::GridParams params,
                            const Manner& manner) {
-  const std::size_t eachGroup = groupSize_ / device_.mostSubgroupSize();
-  params.strands = buffers_.strands.address();
-  std::uint32_t round = 0;
-  for (const GridArrays::Pieces& pieces : all) {
-    if (pieces.key.round != round) commands.barrier(barrier::computeToCompute);
-    round = pieces.key.round;
-    params.count = static_cast<layout::uint>(pieces.strands.size());
-    const ComputePipeline& pipeline = fill({manner.falloff, pieces.key.kinds, pieces.key.goesOn, manner.colours});
+  for (const GridWorks& kind : all) {
+    params.count = kind.count;
+    params.works = buffers_.works.address() + kind.first * sizeof(layout::GridWork);
+    const ComputePipeline& pipeline = fill({manner.falloff, kind.kinds, manner.colours});
     commands.bindTexels(pipeline, {kernelTexels_.handle(), entryTexels_.handle()});
-    commands.dispatchRow(pipeline, params, (pieces.strands.size() + eachGroup - 1) / eachGroup);
-    params.strands += pieces.strands.size() * sizeof(layout::GridStrand);
+    commands.dispatchRow(pipeline, params, (kind.count + groupSize_ - 1) / groupSize_);
   }
 }
 
@@ -167,21 +169,35 @@ std::vector<float> GridDevice::run(std::span<const GridArrays* const> tiles, con
   Sizes sizes = kNoTiles;
   for (const GridArrays* tile : tiles) sizes = sum(sizes, sizesOf(tile->counts(), manner));
   makeRoom(sizes);
-  const std::vector<GridArrays::Pieces> pieces = upload(tiles, sizes, manner.channels);
+  const std::vector<GridWorks> works = upload(tiles, sizes, manner.channels);
+  const bool begun = std::any_of(tiles.begin(), tiles.end(), [](const GridArrays* tile) { return tile->begun; });
+  ComputePipeline& sum = sums_[begun];
+  if (sum.handle() == VK_NULL_HANDLE)
+    sum = device_.createComputePipeline(spirv::grid_sum_comp, sizeof(layout::GridParams),
+                                        std::array<SpecializationConstant, 2>{{{0, groupSize_}, {1, begun}}}, 1);
   if (read_.handle() == VK_NULL_HANDLE)
     read_ = device_.createComputePipeline(spirv::grid_read_comp, sizeof(layout::GridParams),
-                                          std::array<SpecializationConstant, 1>{{{0, groupSize_}}});
+                                          std::array<SpecializationConstant, 1>{{{0, groupSize_}}}, 3);
   const std::size_t kernels = sizes[0] / sizeof(layout::GridKernel);
-  const std::size_t receivers = sizes[7] / sizeof(layout::GridReceiver);
+  const std::size_t receivers = sizes[9] / sizeof(layout::GridReceiver),
+                    strands = sizes[6] / sizeof(layout::GridStrand);
   layout::GridParams of = params(manner.cell);
   queries_.reset();
   device_.run([&](CommandBuffer& commands) {
     const std::uint32_t stage = queries_.begin(commands, "light grid");
     for (std::size_t channel = 0; channel < manner.channels; ++channel) {
       commands.barrier(barrier::computeToCompute);  // the channel, or part of a tile, before took the same nodes
-      fillNodes(commands, pieces, of, manner);
+      fillNodes(commands, works, of, manner);
+      commands.barrier(barrier::computeToCompute);
+      of.count = static_cast<layout::uint>(strands);
+      const std::size_t sums = strands * layout::kBlockNodes / 2;
+      if (strands > 0) {
+        commands.bindTexels(sum, {sumTexels_.handle()});
+        commands.dispatchRow(sum, of, (sums + groupSize_ - 1) / groupSize_);
+      }
       commands.barrier(barrier::computeToCompute);
       of.count = static_cast<layout::uint>(receivers);
+      commands.bindTexels(read_, {storedTexels_.handle(), tableTexels_.handle(), receiverTexels_.handle()});
       commands.dispatchRow(read_, of, (receivers + groupSize_ - 1) / groupSize_);
       of.peaks += kernels * sizeof(float), of.depths += receivers * sizeof(float);
     }
@@ -207,7 +223,7 @@ std::vector<float> GridDevice::runInParts(const GridArrays& tile, const Manner& 
   const GridCounts all = tile.counts();
   const auto most = [&](std::uint64_t share) {
     GridCounts counts = parts.least();
-    for (auto count : {&GridCounts::kernels, &GridCounts::entries, &GridCounts::blocks, &GridCounts::strands,
+    for (auto count : {&GridCounts::kernels, &GridCounts::entries, &GridCounts::works, &GridCounts::strands,
                        &GridCounts::table, &GridCounts::receivers, &GridCounts::stored})
       counts.*count += all.*count * share / kShares;
     return counts;

@@ -40,20 +40,21 @@ class GridDevice {
   struct FillVariant {
     layout::uint falloff;
     std::uint32_t kinds;
-    bool goesOn, colours;
+    bool colours;
     auto operator<=>(const FillVariant&) const = default;
   };
+  static constexpr std::size_t kArrays = 11;
   struct Buffers {
-    Buffer kernels, peaks, entries, blocks, strands, stored, table, receivers, depths;
-    std::array<Buffer*, 9> all() {
-      return {&kernels, &peaks, &entries, &blocks, &strands, &stored, &table, &receivers, &depths};
+    Buffer kernels, peaks, entries, works, sums, blocks, strands, stored, table, receivers, depths;
+    std::array<Buffer*, kArrays> all() {
+      return {&kernels, &peaks, &entries, &works, &sums, &blocks, &strands, &stored, &table, &receivers, &depths};
     }
   };
   /// Bytes of each, in that order.
-  using Sizes = std::array<std::uint64_t, 9>;
+  using Sizes = std::array<std::uint64_t, kArrays>;
   const ComputePipeline& fill(const FillVariant& variant);
   /// The block of zeros.
-  static constexpr Sizes kNoTiles{0, 0, 0, 0, 0, layout::kBlockPairs * sizeof(layout::GridPair), 0, 0, 0};
+  static constexpr Sizes kNoTiles{0, 0, 0, 0, 0, 0, 0, layout::kBlockPairs * sizeof(layout::GridPair), 0, 0, 0};
   static Sizes sizesOf(const GridCounts& counts, const Manner& manner);
   static Sizes sum(const Sizes& a, const Sizes& b);
   bool fits(const Sizes& sizes);
@@ -61,19 +62,20 @@ class GridDevice {
   bool texelsFit(const Sizes& sizes) const;
   void makeRoom(const Sizes& sizes);
   /// The steps of `run`: arrays to the device, what all dispatches are told, and one channel's nodes.
-  std::vector<GridArrays::Pieces> upload(std::span<const GridArrays* const> tiles, const Sizes& sizes,
-                                         std::size_t channels);
+  std::vector<GridWorks> upload(std::span<const GridArrays* const> tiles, const Sizes& sizes, std::size_t channels);
   layout::GridParams params(double cell) const;
-  void fillNodes(CommandBuffer& commands, std::span<const GridArrays::Pieces> all, layout::GridParams params,
+  void fillNodes(CommandBuffer& commands, std::span<const GridWorks> all, layout::GridParams params,
                  const Manner& manner);
 
   const Device& device_;
   TimestampQueries queries_;
-  std::uint32_t groupSize_, storeLanes_;
+  std::uint32_t groupSize_;
   std::map<FillVariant, ComputePipeline> fills_;
+  std::array<ComputePipeline, 2> sums_;  // the second where blocks may have been begun
   ComputePipeline read_;
   Buffers buffers_;
-  TexelView kernelTexels_, entryTexels_;  // of buffers_, so they go before them
+  // Of buffers_, so they go before them.
+  TexelView kernelTexels_, entryTexels_, sumTexels_, storedTexels_, tableTexels_, receiverTexels_;
   double seconds_ = 0;
 };
 

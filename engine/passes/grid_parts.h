@@ -4,7 +4,7 @@
 // much of that row as there is room for. What a block stores stays where it is, in one array for all parts, until the
 // receivers that look at it are through and the strand's next block is put on it: never more than one block a strand
 // beside the part's own. So every sum is made in the order in which the whole tile makes it, and has the same bits.
-// The least that cannot be cut are the particles of one block, or kMostBlockEntries of them.
+// The least that cannot be cut are the particles of one work.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -31,21 +31,16 @@ class GridParts {
   std::span<const std::uint32_t> receivers() const { return receivers_; }
 
  private:
-  static constexpr std::size_t kStrands = std::size_t{layout::kTileBlocks} * layout::kTileBlocks;
+  static constexpr std::size_t kColumns = std::size_t{layout::kTileBlocks} * layout::kTileBlocks;
 
-  /// As much of a strand as goes through a shader at once.
-  struct Piece {
-    layout::GridStrand strand;
-    std::uint32_t kinds;
-    std::size_t column() const;  ///< the strand's number: of blocks, [row][column]
-  };
-  /// Block number `first` of a piece, or where `piece` is kReads the receivers order_[first … end).
+  /// Work number `first` of a strand, or where `strand` is kReads the receivers order_[first … end).
   struct Step {
-    std::uint32_t group, piece, first, end;
+    std::uint32_t group, strand, first, end;
   };
-  /// A block that a part has, and the stored block that its strand had come to: 0 none, its own where it goes on.
+  /// What a part has of a strand: works, and the stored block that it had come to: 0 none.
   struct Chosen {
-    std::uint32_t piece, block, before;
+    std::uint32_t before = 0;
+    std::vector<std::uint32_t> works;
   };
   static constexpr std::uint32_t kReads = ~0u;
 
@@ -53,26 +48,25 @@ class GridParts {
   void setLeast();
   /// Puts a step into the part; false: it does not fit.
   bool add(const Step& step);
-  bool addBlock(const Step& step);
+  bool addWork(const Step& step);
   bool addReceivers(const Step& step);
   void putKernels(GridArrays& to) const;
-  void putStrand(std::span<const Chosen> blocks, GridArrays& to) const;
+  void putStrand(const Chosen& chosen, GridArrays& to) const;
   void putReceivers(GridArrays& to) const;
 
   const GridArrays& tile_;
-  std::vector<Piece> pieces_;         // strand by strand
   std::vector<std::uint32_t> order_;  // receivers by group
   std::vector<Step> steps_;
   GridCounts least_, most_;
   std::size_t channel_ = 0;
 
-  std::size_t next_ = 0;                        // step
-  std::array<std::uint32_t, kStrands> last_{};  // stored block that a strand has come to, by the tile's number
-  std::vector<std::uint32_t> slotOf_;           // of stored blocks, by the tile's number
-  std::vector<std::uint32_t> free_;             // slots
+  std::size_t next_ = 0;               // step
+  std::vector<std::uint32_t> last_;    // stored block that a strand has come to, by the tile's number
+  std::vector<std::uint32_t> slotOf_;  // of stored blocks, by the tile's number
+  std::vector<std::uint32_t> free_;    // slots
   // Of the part:
   GridCounts has_;
-  std::array<std::vector<Chosen>, kStrands> chosen_;
+  std::vector<Chosen> chosen_;                     // by strand
   std::vector<std::uint32_t> kernels_, localOf_;   // the tile's numbers, and back
   std::vector<std::uint32_t> groups_, receivers_;  // that are read, both by group
   std::vector<std::uint32_t> over_;                // slots that are free once the part is through

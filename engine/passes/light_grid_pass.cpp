@@ -10,8 +10,6 @@ namespace {
 
 /// Particles and receivers of the tiles that are set up together: of so many that all threads are busy to the end.
 constexpr std::size_t kMostItems = std::size_t{1} << 20;
-/// Of a shader's loops: lavapipe ends them after 65535 altogether.
-constexpr std::uint32_t kMostSteps = 60000;
 
 }  // namespace
 
@@ -43,7 +41,7 @@ std::span<const LightGridPass::Work> LightGridPass::setUpTiles(const Call& call,
     work.planned = &tiles[begin + k];
     tile.setUp(call.tree, call.receivers, call.plan, *work.planned, call.shape, call.options.falloff);
     blocks.setUp(tile, call.receivers, call.plan.receivers(*work.planned), call.plan.particles(*work.planned),
-                 device_.leastSubgroupSize(), kMostSteps, work.arrays);
+                 work.arrays);
   });
   return std::span(works_).first(end - begin);
 }

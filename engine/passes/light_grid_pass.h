@@ -2,14 +2,15 @@
 //
 // The host plans the tiles, places particles and receivers, in double, weighs the kernels in the same step, and sorts
 // each tile's particles by the blocks of 4 × 4 nodes and 4 bins that their kernels touch (grid_blocks.h). The device
-// puts them down and sums along the depth (grid_fill.comp, a subgroup for all blocks over the same nodes), and reads
-// what the receivers find (grid_read.comp). Blocks that no particle touches are not stored. The two dispatches are what
-// grows with a finer grid. Sums of weights are left to the host, as it has the kernels in its vectors anyhow: on
-// lavapipe a shader of its own took four times as long, mostly to load them.
+// puts them down (grid_fill.comp, a lane a block), sums along the depth (grid_sum.comp) and reads what the receivers
+// find (grid_read.comp). Blocks that no particle touches are not stored. The dispatches are what grows with a finer
+// grid. Sums of weights are left to the host, as it has the kernels in its vectors anyhow: on lavapipe a shader of its
+// own took four times as long, mostly to load them.
 //
-// This suits hardware: a kernel is loaded once for 64 multiply-adds on sums in registers, strands go by subgroups,
-// thousands of them at once; stores are side by side; there is no atomic, shared memory or barrier of a workgroup, so
-// sums are always in the same order. On an H100 it is the host's share that takes the time (docs/performance.md).
+// This suits hardware: a kernel is loaded once for 64 multiply-adds on sums in registers; lanes tell each other
+// nothing, neighbours have about as many particles, tens of thousands of lanes are under way at once; there is no
+// atomic, shared memory or barrier of a workgroup, so sums are always in the same order, on subgroups of any size. On
+// an H100 it is the host's share that takes the time (docs/performance.md).
 #pragma once
 #include <tbb/enumerable_thread_specific.h>
 
@@ -25,15 +26,14 @@ class LightGridPass {
   /// `device` must outlive the pass.
   explicit LightGridPass(const Device& device) : device_(device), grid_(device) {}
 
-  /// As mote::gridOpticalDepths, T within 2e-5 of it; the same bits each time on devices with subgroups of one size,
-  /// whatever their budget (tested on lavapipe; a driver may contract the pipelines of parts otherwise). Tiles go
-  /// through the device in batches of about 64 MiB, or what the budget leaves of it. Each takes there 32 bytes a
-  /// particle (44 with three channels), 4 for each block that it touches, 20 a receiver (28), and 512 a block that is
-  /// touched. A tile that does not fit goes in parts (grid_parts.h), one channel after the other; throws MachineError
-  /// where not even the least fits, which is 1.4 MiB where kMostBlockEntries particles meet in a block and less where
-  /// fewer do. The host holds about the same as the device, without what is stored, of a million particles and
-  /// receivers at a time, or of one tile. On lavapipe 4.6 times the CPU time of gridOpticalDepths at
-  /// cells of a radius, 3.4 at 0.35, as that goes by patches there.
+  /// As mote::gridOpticalDepths, T within 2e-5 of it; the same bits each time, whatever the device's budget (tested on
+  /// lavapipe; a driver may contract the pipelines of parts otherwise). Tiles go through the device in batches of about
+  /// 64 MiB, or what the budget leaves of it. Each takes there 32 bytes a particle (44 with three channels), 4 for each
+  /// block that it touches, 20 a receiver (28), and 804 a block that is touched. A tile that does not fit goes in parts
+  /// (grid_parts.h), one channel after the other; throws MachineError where not even the least fits, which is 0.2 MiB
+  /// at most. The host holds about the same as the device, without what is stored, of a million particles and receivers
+  /// at a time, or of one tile. On lavapipe 3.5 times the CPU time of gridOpticalDepths at cells of a radius, as that
+  /// goes by patches there, and 2.4 at 0.35.
   std::vector<float> opticalDepths(const Octree& tree, const Receivers& receivers, const layout::Light& light,
                                    const LightingOptions& options, const GridResolution& resolution,
                                    std::span<const std::uint8_t> reached = {}, const RaysDone& done = {});

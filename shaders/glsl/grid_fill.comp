@@ -1,28 +1,25 @@
-// Puts kernels down on the light grid and sums along the depth: one subgroup a strand, all groups of bins over 4 × 4 nodes.
+// Puts kernels down on the light grid: one lane a work, the particles of one group of bins over 4 × 4 nodes.
 //
-// A lane takes two particles at a time to all 16 nodes and 4 bins; the 64 sums stay in its registers until the block's
-// particles are through. Then they are added up over the lanes, always in the same order, and on what the blocks before
-// left. So a particle is loaded once for 64 multiply-adds, stores are side by side, and there is no atomic nor barrier.
+// A lane takes two particles at a time to all 16 nodes and 4 bins; the 64 sums stay in its registers until they are
+// through. So a particle is loaded once for 64 multiply-adds, sums are in the order of the particles on every device,
+// and there is no atomic nor barrier, nor anything that lanes tell each other. grid_sum.comp goes on from there.
 //
-// On lavapipe (Mesa 22.3) what is loaded inside of a loop costs most, which is why a block is that large, and why kernels
-// come as texels (texel_view.h); loops over nodes and bins must unroll, or the sums live in memory.
+// Neighbouring lanes have about as many particles each (joinWorks). On lavapipe (Mesa 22.3) what is loaded inside of a
+// loop costs most, which is why a block is that large, and why kernels come as texels (texel_view.h); loops over nodes
+// and bins must unroll, or the sums live in memory. A sum over a subgroup's lanes took 90 cycles for each of the 64.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
-#extension GL_KHR_shader_subgroup_basic : require
-#extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_EXT_control_flow_attributes : require
 #include "lib/grid.glsl"
 
 layout(binding = 0) uniform textureBuffer kernels;   // GridKernel, two texels each
-layout(binding = 1) uniform utextureBuffer entries;  // numbers of kernels, block after block
+layout(binding = 1) uniform utextureBuffer entries;  // numbers of kernels, two each
 layout(constant_id = 1) const uint kFalloff = 0;
 layout(constant_id = 2) const bool kTents = true;     // there may be kernels that are tents …
 layout(constant_id = 3) const bool kEllipses = true;  // … or have a falloff on the light's plane …
 layout(constant_id = 4) const bool kCurved = true;    // … or near a point light
-layout(constant_id = 5) const bool kGoesOn = false;   // the strand's first block has sums already
-layout(constant_id = 6) const uint kStoreLanes = 4;   // at most as many as a subgroup has lanes; divides 16
-layout(constant_id = 7) const bool kColours = false;
+layout(constant_id = 5) const bool kColours = false;
 
 #include "lib/falloff.glsl"
 
@@ -33,12 +30,9 @@ float weightOfForm(float q, float slope) {
   return max(min(u * u, 1.0 - slope * q), 0.0);
 }
 
-const uint kChunks = kBlockNodes / kStoreLanes;
-const uint kMostChunks = kBlockNodes;
-const uint kTurn = 2;  // particles of a lane at once: lavapipe selects what a loop carries anew each time
+const uint kTurn = 2;  // particles at once: lavapipe selects what a loop carries anew each time
 
-float sum[kBlockNodes * kBlockBins];  // of the lane's particles, [bin][row][column]
-float carry[kMostChunks];             // the lane's nodes of each chunk: what lies before the block
+float sum[kBlockNodes * kBlockBins];  // [bin][row][column]
 
 /// Share of a particle that lies before its centre plus x radii of depth.
 float depthShare(float x) {
@@ -72,26 +66,26 @@ GridKernel kernelAt(int i) {
   return GridKernel(place.x, place.y, place.z, place.w, form.x, form.y, form.z, scale);
 }
 
-void addParticles(GridKernel all[kTurn], GridStrand strand, float bin) {
+void addParticles(GridKernel all[kTurn], GridWork work) {
   float share[kTurn][kBlockBins], slope[kTurn];
   [[unroll]] for (uint t = 0; t < kTurn; ++t) {
     const GridKernel p = all[t];
     slope[t] = slopeOf(p);
-    float before = depthShare((bin - p.depth) * p.inverseRadius);
+    float before = depthShare((work.bin - p.depth) * p.inverseRadius);
     [[unroll]] for (uint k = 0; k < kBlockBins; ++k) {
-      const float after = depthShare((bin + float(k + 1) - p.depth) * p.inverseRadius);
+      const float after = depthShare((work.bin + float(k + 1) - p.depth) * p.inverseRadius);
       share[t][k] = p.scale * (after - before);
       before = after;
     }
   }
   [[unroll]] for (uint r = 0; r < kBlockEdge; ++r) {
     [[unroll]] for (uint c = 0; c < kBlockEdge; ++c) {
-      const vec2 uv = vec2(strand.u + float(c) * params.cell, strand.v + float(r) * params.cell);
+      const vec2 uv = vec2(work.u + float(c) * params.cell, work.v + float(r) * params.cell);
       float at[kTurn];
       [[unroll]] for (uint t = 0; t < kTurn; ++t) {
         const GridKernel p = all[t];
-        const float dy = (strand.row + float(r)) - p.y, bdy = p.b * dy, cdy2 = p.c * (dy * dy);
-        const float dx = (strand.column + float(c)) - p.x;
+        const float dy = (work.row + float(r)) - p.y, bdy = p.b * dy, cdy2 = p.c * (dy * dy);
+        const float dx = (work.column + float(c)) - p.x;
         at[t] = weightAt(p, slope[t], dx, dy, bdy, cdy2, uv);
       }
       [[unroll]] for (uint k = 0; k < kBlockBins; ++k) {
@@ -103,52 +97,25 @@ void addParticles(GridKernel all[kTurn], GridStrand strand, float bin) {
   }
 }
 
-/// The sums over the lanes, added to what lies before; the next block begins where this one ends.
-void storeBlock(uint stored, bool goesOn) {
-  WordPairBuffer words = WordPairBuffer(params.stored);
-  const uint lane = gl_SubgroupInvocationID, to = stored * kBlockPairs + min(lane, kStoreLanes - 1);
-  [[unroll]] for (uint chunk = 0; chunk < kChunks; ++chunk) {
-    float sums = 0.0;
-    [[unroll]] for (uint k = 0; k < kBlockBins; ++k) {
-      const uint node = k * kBlockNodes + chunk * kStoreLanes;
-      vec2 edges = vec2(carry[chunk]);
-      if (kGoesOn && goesOn) edges = loadFloats(words, to + node);
-      edges.x += sums;
-      float total = 0.0;
-      [[unroll]] for (uint j = 0; j < kStoreLanes; ++j) {
-        const float one = subgroupAdd(sum[node + j]);
-        total = lane == j ? one : total;
-      }
-      sums += total;
-      edges.y += sums;
-      if (lane < kStoreLanes) words.at[to + node] = pack64(floatBitsToUint(edges));
-      if (k == kBlockBins - 1) carry[chunk] = edges.y;
-    }
-  }
-}
-
 void main() {
-  const uint s = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_NumSubgroups + gl_SubgroupID;
-  if (s >= params.count) return;
-  const GridStrand strand = params.strands.at[s];
-  [[unroll]] for (uint chunk = 0; chunk < kChunks; ++chunk) carry[chunk] = 0.0;
-  uint b = strand.first;
+  const uint k =
+      (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+  if (k >= params.count) return;
+  const GridWork work = params.works.at[k];
+  [[unroll]] for (uint j = 0; j < kBlockNodes * kBlockBins; ++j) sum[j] = 0.0;
+  uint at = work.first;
+  const uint last = work.end - 1;
   do {
-    const GridBlock block = params.blocks.at[b];
-    [[unroll]] for (uint j = 0; j < kBlockNodes * kBlockBins; ++j) sum[j] = 0.0;
-    uint at = block.first + gl_SubgroupInvocationID;
-    const uint last = block.end - 1;
-    uint begin = block.first;
-    do {
-      GridKernel all[kTurn];
-      [[unroll]] for (uint t = 0; t < kTurn; ++t) {
-        all[t] = kernelAt(int(texelFetch(entries, int(min(at, last))).x));
-        all[t].scale = at <= last ? all[t].scale : 0.0;
-        at += gl_SubgroupSize, begin += gl_SubgroupSize;
-      }
-      addParticles(all, strand, block.bin);
-    } while (begin <= last);
-    storeBlock(block.stored, b == strand.first);
-    ++b;
-  } while (b < strand.end);
+    const uvec2 pair = texelFetch(entries, int(at / kTurn)).xy;
+    GridKernel all[kTurn];
+    [[unroll]] for (uint t = 0; t < kTurn; ++t) {
+      all[t] = kernelAt(int(pair[t]));
+      all[t].scale = at <= last ? all[t].scale : 0.0;
+      ++at;
+    }
+    addParticles(all, work);
+  } while (at <= last);
+  WordPairBuffer to = WordPairBuffer(params.sums);
+  [[unroll]] for (uint j = 0; j < kBlockPairs / 2; ++j)
+    to.at[work.sums * (kBlockPairs / 2) + j] = pack64(floatBitsToUint(vec2(sum[2 * j], sum[2 * j + 1])));
 }

@@ -130,12 +130,11 @@ TEST_F(LightGridPassTest, LightsAnyPointsAndOnlyThoseReached) {
 }
 
 TEST_F(LightGridPassTest, GoesOnWhereMoreParticlesMeetThanAShaderMayLoopOver) {
-  // Cells as large as this put all into a few blocks: 87,500 steps for subgroups of 8, and lavapipe ends a shader's
-  // loops after 65,535.
+  // Cells as large as this put all into a few blocks, and lavapipe ends a shader's loops after 65,535.
   const Octree tree = ballTree(700000, 0.02, 0.02, 2, layout::kFalloffSmooth);
   const double found = worst(tree, directionalLight({0, 0, 1}), 0, {5, 5});
   const double few = worst(tree, directionalLight({0, 0, 1}), 0, {5, 0.3});
-  // Here no block has more than kMostBlockEntries, but all of a strand do.
+  // Here few blocks have more than kMostWorkEntries, but all of a strand do.
   const double many = worst(tree, directionalLight({0, 0, 1}), 0, {5, 0.005});
   std::printf("worst |dT| of 700,000 in a block: %.2e, in a few: %.2e, in many: %.2e\n", found, few, many);
   EXPECT_LE(found, kRounding);
@@ -155,8 +154,8 @@ TEST_F(LightGridPassTest, GivesTheSameBitsEveryTime) {
 
 TEST_F(LightGridPassTest, SplitsTilesThatDoNotFitToTheSameBits) {
   // Few cells: each face of the cube is a tile, with all kinds of kernels about the light, or the ball is but one. In
-  // the third grid more particles than kMostBlockEntries meet in a block, in the fourth more than a shader may loop
-  // over stand behind one another.
+  // the third grid more particles than kMostWorkEntries meet in a block, in the fourth many blocks stand behind one
+  // another.
   struct Case {
     layout::Light light;
     GridResolution resolution;

@@ -1,6 +1,7 @@
 // Weights of a tile's kernels, for who puts them down elsewhere: a device.
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "host/lighting/grid/tile.h"
 
@@ -31,10 +32,36 @@ struct BatchWindow {
   }
 };
 
+/// The twin of CoveredNodes of windowOf and reachOf, in one word.
+HWY_INLINE auto coveredNodes(const GridParticles& p, std::size_t i) {
+  const hn::RebindToSigned<decltype(kTag)> ints;
+  const Vec half = load(&p.half[i]), zero = hn::Zero(kTag);
+  const Vec reach = hn::Add(hn::Max(half, set(1)), set(1e-3f));
+  const auto first = [&](Vec at) {
+    const Vec low = hn::Min(hn::Max(hn::Sub(at, reach), zero), set(kTileCells + 1));
+    return hn::ConvertTo(ints, hn::Ceil(low));
+  };
+  const auto end = [&](Vec at) {
+    const Vec high = hn::Min(hn::Max(hn::Add(at, reach), set(-1)), set(kTileCells));
+    return hn::ConvertTo(ints, hn::Add(hn::Floor(high), set(1)));
+  };
+  const Vec x = load(&p.points.x[i]), y = load(&p.points.y[i]);
+  const auto columns = hn::Or(first(x), hn::ShiftLeft<8>(end(x)));
+  const auto word = hn::Or(columns, hn::Or(hn::ShiftLeft<16>(first(y)), hn::ShiftLeft<24>(end(y))));
+  const auto firstGroup = hn::ShiftRight<2>(hn::LoadU(ints, &p.firstBin[i]));
+  const auto lastGroup = hn::ShiftRight<2>(hn::LoadU(ints, &p.lastBin[i]));
+  const auto shallow = hn::Lt(hn::Sub(lastGroup, firstGroup), hn::Set(ints, kMostGroups));
+  const auto narrow = hn::And(hn::Gt(half, zero), hn::Le(half, set(0.5f * kMostWindow)));
+  const auto flat = hn::Not(hn::Gt(load(&p.curved[i]), zero));
+  const auto batched = hn::And(hn::RebindMask(ints, hn::And(narrow, flat)), shallow);
+  return hn::IfThenElse(batched, word, hn::Set(ints, -1));
+}
+
 /// Sums of F over windows of any width, and F between the nodes where the particles stand.
 template <layout::uint kFalloff>
-HWY_NOINLINE void weighAll(GridTile& tile, float* scales) {
+HWY_NOINLINE void weighAll(GridTile& tile, layout::GridKernel* kernels, std::uint32_t* nodes) {
   GridParticles& p = tile.particles;
+  const bool colours = tile.channels > 1;
   for (std::size_t first = 0; first < p.points.count; first += kGridBatch) {
     const BatchWindow window(p, first);
     for (std::size_t lane = 0; lane < kGridBatch; lane += kLanes) {
@@ -67,18 +94,28 @@ HWY_NOINLINE void weighAll(GridTile& tile, float* scales) {
       const Vec lower = between(corner(leftX, leftY, backX, backY), corner(backX, leftY, intoX, backY), intoX);
       const Vec upper = between(corner(leftX, backY, backX, intoY), corner(backX, backY, intoX, intoY), intoX);
       const Vec inverse = hn::Div(one, load(&p.depthRadius[i])), scale = hn::Div(load(&p.mass[i]), sum);
-      hn::StoreU(scale, kTag, scales + i);
+      const Vec depth = load(&p.depth[i]);
+      alignas(64) float place[4 * kLanes], form[4 * kLanes];
+      hn::StoreInterleaved4(x, y, depth, inverse, kTag, place);
+      hn::StoreInterleaved4(a, b, hn::IfThenElse(tent, zero, c),
+                            colours ? scale : hn::Mul(scale, load(p.peak[0].at(i))), kTag, form);
+      for (std::size_t k = 0; k < kLanes; ++k) {
+        std::memcpy(&kernels[i + k].x, place + 4 * k, 4 * sizeof(float));
+        std::memcpy(&kernels[i + k].a, form + 4 * k, 4 * sizeof(float));
+      }
+      const hn::RebindToUnsigned<decltype(kTag)> words;
+      hn::StoreU(hn::BitCast(words, coveredNodes(p, i)), words, nodes + i);
       const Vec across = hn::Mul(scale, between(lower, upper, intoY));
-      hn::StoreU(hn::Mul(across, ownDepthShare(p, i, load(&p.depth[i]), inverse)), kTag, &p.own[i]);
+      hn::StoreU(hn::Mul(across, ownDepthShare(p, i, depth, inverse)), kTag, &p.own[i]);
     }
   }
 }
 
-void weighBatches(GridTile& tile, float* scales) {
+void weighBatches(GridTile& tile, layout::GridKernel* kernels, std::uint32_t* nodes) {
   switch (tile.falloff) {
-    case layout::kFalloffLinear: return weighAll<layout::kFalloffLinear>(tile, scales);
-    case layout::kFalloffSphere: return weighAll<layout::kFalloffSphere>(tile, scales);
-    default: return weighAll<layout::kFalloffSmooth>(tile, scales);
+    case layout::kFalloffLinear: return weighAll<layout::kFalloffLinear>(tile, kernels, nodes);
+    case layout::kFalloffSphere: return weighAll<layout::kFalloffSphere>(tile, kernels, nodes);
+    default: return weighAll<layout::kFalloffSmooth>(tile, kernels, nodes);
   }
 }
 
@@ -90,9 +127,8 @@ namespace mote {
 
 HWY_EXPORT(weighBatches);
 
-void weighTile(GridTile& tile, std::vector<float>& scale) {
-  if (scale.size() < tile.particles.own.size()) scale.resize(tile.particles.own.size());
-  HWY_DYNAMIC_DISPATCH(weighBatches)(tile, scale.data());
+void weighTile(GridTile& tile, layout::GridKernel* kernels, std::uint32_t* nodes) {
+  HWY_DYNAMIC_DISPATCH(weighBatches)(tile, kernels, nodes);
 }
 
 }  // namespace mote

@@ -40,37 +40,39 @@ MOTE_ASSERT_OFFSET(GridKernel, c, 24);
 MOTE_ASSERT_OFFSET(GridKernel, scale, 28);
 MOTE_ASSERT_SIZE(GridKernel, 32);
 
-// The particles of one group of bins on 4 × 4 nodes.
-struct GridBlock {
-  uint first;   // entries
-  uint end;     // > first
-  uint stored;  // number of the stored block
-  float bin;    // the group's first [bins from the tile's base]
-};
-MOTE_BUFFER(GridBlockBuffer, GridBlock)
-MOTE_ASSERT_OFFSET(GridBlock, first, 0);
-MOTE_ASSERT_OFFSET(GridBlock, end, 4);
-MOTE_ASSERT_OFFSET(GridBlock, stored, 8);
-MOTE_ASSERT_OFFSET(GridBlock, bin, 12);
-MOTE_ASSERT_SIZE(GridBlock, 16);
-
-// Blocks through the depth over the same 4 × 4 nodes, or a piece of them.
-struct GridStrand {
-  uint first;   // blocks
-  uint end;     // > first
-  float column; // of the first node [nodes from the tile's corner]
+// The particles of one group of bins on 4 × 4 nodes, or some of them: what one lane sums up.
+struct GridWork {
+  uint first;    // entries; even
+  uint end;      // > first
+  uint sums;     // where its kBlockPairs sums go, [bin][row][column]
+  float bin;     // the group's first [bins from the tile's base]
+  float column;  // of the first node [nodes from the tile's corner]
   float row;
-  float u;      // where that node stands on the plane one unit from a point light
+  float u;       // where that node stands on the plane one unit from a point light
   float v;
+};
+MOTE_BUFFER(GridWorkBuffer, GridWork)
+MOTE_ASSERT_OFFSET(GridWork, first, 0);
+MOTE_ASSERT_OFFSET(GridWork, end, 4);
+MOTE_ASSERT_OFFSET(GridWork, sums, 8);
+MOTE_ASSERT_OFFSET(GridWork, bin, 12);
+MOTE_ASSERT_OFFSET(GridWork, column, 16);
+MOTE_ASSERT_OFFSET(GridWork, row, 20);
+MOTE_ASSERT_OFFSET(GridWork, u, 24);
+MOTE_ASSERT_OFFSET(GridWork, v, 28);
+MOTE_ASSERT_SIZE(GridWork, 32);
+
+// Works through the depth over the same 4 × 4 nodes, or some of them. Neighbours may have one stored block.
+struct GridStrand {
+  uint first;   // works, by their sums
+  uint end;     // > first
+  uint before;  // the stored block that those before have come to; 0: none
 };
 MOTE_BUFFER(GridStrandBuffer, GridStrand)
 MOTE_ASSERT_OFFSET(GridStrand, first, 0);
 MOTE_ASSERT_OFFSET(GridStrand, end, 4);
-MOTE_ASSERT_OFFSET(GridStrand, column, 8);
-MOTE_ASSERT_OFFSET(GridStrand, row, 12);
-MOTE_ASSERT_OFFSET(GridStrand, u, 16);
-MOTE_ASSERT_OFFSET(GridStrand, v, 20);
-MOTE_ASSERT_SIZE(GridStrand, 24);
+MOTE_ASSERT_OFFSET(GridStrand, before, 8);
+MOTE_ASSERT_SIZE(GridStrand, 12);
 
 // Both edges of a bin on a node's ray: what lies before them.
 struct GridPair {
@@ -105,28 +107,32 @@ MOTE_ASSERT_OFFSET(GridReceiver, into, 8);
 MOTE_ASSERT_OFFSET(GridReceiver, place, 12);
 MOTE_ASSERT_SIZE(GridReceiver, 16);
 
-// One dispatch of grid_fill.comp or grid_read.comp, of one channel. Kernels and their entries come as texel views.
+// One dispatch of a grid_*.comp, of one channel. Kernels and their entries come as texel views.
 struct GridParams {
   MOTE_ADDRESS(FloatBuffer) peaks;       // of the kernels: optical depth through the centre; three channels alone
-  MOTE_ADDRESS(GridBlockBuffer) blocks;
+  MOTE_ADDRESS(GridWorkBuffer) works;    // in any order
+  MOTE_ADDRESS(FloatBuffer) sums;        // kBlockPairs a work
+  MOTE_ADDRESS(UintBuffer) blocks;       // the stored block of each work, by its sums
   MOTE_ADDRESS(GridStrandBuffer) strands;
   MOTE_ADDRESS(GridPairBuffer) stored;   // kBlockPairs a block
   MOTE_ADDRESS(GridEntryPairBuffer) table;  // tile by tile, [group][block of the tile]
   MOTE_ADDRESS(GridReceiverBuffer) receivers;
   MOTE_ADDRESS(FloatBuffer) depths;      // in: what each receiver would find of its own particle; out: what it finds
-  uint count;                            // of strands or receivers
+  uint count;                            // of works, strands or receivers
   float cell;                            // [on the plane one unit from a point light]
 };
 MOTE_ASSERT_OFFSET(GridParams, peaks, 0);
-MOTE_ASSERT_OFFSET(GridParams, blocks, 8);
-MOTE_ASSERT_OFFSET(GridParams, strands, 16);
-MOTE_ASSERT_OFFSET(GridParams, stored, 24);
-MOTE_ASSERT_OFFSET(GridParams, table, 32);
-MOTE_ASSERT_OFFSET(GridParams, receivers, 40);
-MOTE_ASSERT_OFFSET(GridParams, depths, 48);
-MOTE_ASSERT_OFFSET(GridParams, count, 56);
-MOTE_ASSERT_OFFSET(GridParams, cell, 60);
-MOTE_ASSERT_SIZE(GridParams, 64);
+MOTE_ASSERT_OFFSET(GridParams, works, 8);
+MOTE_ASSERT_OFFSET(GridParams, sums, 16);
+MOTE_ASSERT_OFFSET(GridParams, blocks, 24);
+MOTE_ASSERT_OFFSET(GridParams, strands, 32);
+MOTE_ASSERT_OFFSET(GridParams, stored, 40);
+MOTE_ASSERT_OFFSET(GridParams, table, 48);
+MOTE_ASSERT_OFFSET(GridParams, receivers, 56);
+MOTE_ASSERT_OFFSET(GridParams, depths, 64);
+MOTE_ASSERT_OFFSET(GridParams, count, 72);
+MOTE_ASSERT_OFFSET(GridParams, cell, 76);
+MOTE_ASSERT_SIZE(GridParams, 80);
 MOTE_LAYOUT_END
 
 #endif
