@@ -80,6 +80,19 @@ TEST(CsvReader, LeavesOtherTextsAlone) {
     expectFileRefused(text, {"a format that Mote reads", "CSV"});
 }
 
+TEST(CsvReader, TakesFromACutTableNoMoreThanItsWholeRows) {
+  const std::string whole = "x y z ID\n1 2 3 10\n4 5 6 20\n";
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    SCOPED_TRACE(size);
+    const std::size_t rows = size < whole.find("10") + 1 ? 0 : size < whole.find("20") + 1 ? 1 : 2;
+    const bool between = size <= whole.find('4') && rows == 1;  // else a row lacks numbers
+    if (rows == 2 || between)
+      EXPECT_EQ(OpenedFile(whole.substr(0, size)).file->count(), rows);
+    else
+      expectFileRefused(whole.substr(0, size), {"particles"});
+  }
+}
+
 TEST(CsvReader, SurvivesEveryFlippedBit) { expectEveryFlippedBitSurvived("x y z ID\n1 2 3 10\n4 5 6 20\n", 4); }
 
 TEST(CsvReader, ReadsLinesThatCrossTheEndsOfItsBuffer) {

@@ -20,6 +20,7 @@
 #include "host/core/parallel.h"
 #include "host/particles/formats/prt_reader.h"
 #include "host/particles/formats/prt_writer.h"
+#include "tests/support/opened_file.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/temp_folder.h"
 
@@ -145,6 +146,12 @@ TEST(PrtReader, RefusesTruncationAtEveryByteOfTheHeader) {
   ASSERT_GT(header, 150u);
   for (std::size_t length = 0; length <= header; ++length)
     EXPECT_THROW(positionsOf(whole.substr(0, length)), InputError) << "cut at " << length << " of " << header;
+}
+
+TEST(PrtReader, SurvivesEveryFlippedBit) {
+  const std::string whole = PrtFile().bytes();
+  constexpr std::uint64_t kDeflate = 1032;  // bytes that one of zlib's can hold: reading finds out
+  test::expectEveryFlippedBitSurvived(whole, whole.size() * kDeflate);
 }
 
 TEST(PrtReader, RefusesTruncationAtFiftyPlacesOfTheBody) {
