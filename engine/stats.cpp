@@ -83,8 +83,11 @@ std::string statsJson(const RunStats& run) {
     entry["bytes"] = {{"peak_rss", peakResidentBytes()}, {"device", frame.deviceBytes}};
     frames.push_back(std::move(entry));
   }
-  const Json root = {{"version", MOTE_VERSION}, {"device", run.device},   {"lighting", run.lighting},
-                     {"raster", run.raster},    {"threads", run.threads}, {"frames", std::move(frames)}};
+  Json failed = Json::array();
+  for (const FailedFrame& frame : run.failed) failed.push_back({{"frame", frame.frame}, {"error", frame.error}});
+  const Json root = {{"version", MOTE_VERSION},    {"device", run.device},   {"lighting", run.lighting},
+                     {"raster", run.raster},       {"threads", run.threads}, {"frames", std::move(frames)},
+                     {"failed", std::move(failed)}};
   return root.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

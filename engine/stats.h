@@ -41,11 +41,17 @@ struct FrameStats {
   std::vector<std::string> warnings;
 };
 
+struct FailedFrame {
+  int frame = 1;
+  std::string error;  ///< the sentence
+};
+
 struct RunStats {
   std::string device = "none";   ///< Vulkan device in use
   std::string lighting, raster;  ///< "cpu" or "gpu"
   unsigned threads = 0;
-  std::vector<FrameStats> frames;
+  std::vector<FrameStats> frames;  ///< that were written
+  std::vector<FailedFrame> failed;
 };
 
 /// Most memory this process ever held [bytes].

@@ -8,6 +8,9 @@ class App;
 
 namespace mote {
 
+// SCENE.md: 0 done, 1 a comparison failed, 2 bad input or usage, 3 the machine; output_file.h: 130 interrupted.
+constexpr int kBadInput = 2, kMachine = 3;
+
 /// The flags that stand before or after any subcommand.
 struct CommonOptions {
   unsigned threads = 0;      ///< 0: one a core
@@ -18,7 +21,7 @@ struct CommonOptions {
 };
 
 // Each adds its subcommand with its flags; the callback runs the command and throws as the library does. The int that a
-// command reports through `exitCode` is 0, or 1 where a comparison failed.
+// command reports through `exitCode` is 0, 1 where a comparison failed, or what the worst of several frames came to.
 void addRenderCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
 void addLightCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
 void addCrosscheckCommand(CLI::App& app, const CommonOptions& common, int& exitCode);

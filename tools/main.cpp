@@ -18,9 +18,6 @@
 namespace mote {
 namespace {
 
-// SCENE.md: 0 done, 1 a comparison failed, 2 bad input or usage, 3 the machine, 130 interrupted.
-constexpr int kBadInput = 2, kMachine = 3, kInterrupted = 130;
-
 // More than any machine has; a typo of a few digits would otherwise start as many threads.
 constexpr int kMaxThreads = 4096;
 
@@ -103,7 +100,7 @@ int run(int argc, char** argv) {
   app.footer(
       "Any command also takes --threads, --device, --device-memory, --validate, -q and -v (mote --help).\n"
       "Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage, 3 the machine (device, memory, disk), "
-      "130 interrupted.");
+      "130 interrupted, 143 ended.");
   addCommonOptions(app, common);
   addCommands(app, common, exitCode);
 
@@ -134,7 +131,7 @@ int main(int argc, char** argv) {
   int exitCode = 0;
   try {
     std::signal(SIGXFSZ, SIG_IGN);  // a file-size limit is a failed write with a message, not a killed process
-    removeTemporaryFilesOnSignal(kInterrupted);
+    removeTemporaryFilesOnSignal();
     exitCode = run(argc, argv);
     if (std::fflush(stdout) != 0) exitCode = report("writing to stdout failed", kMachine);
   } catch (const InputError& error) {

@@ -2,7 +2,10 @@
 #include "tools/render.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdlib>
+#include <map>
+#include <new>
 
 #include "host/core/error.h"
 #include "host/core/log.h"
@@ -19,6 +22,7 @@ namespace {
 struct RenderOptions {
   SceneOptions scene;
   std::string output, frames, size, lighting, raster, preview, exposure = "auto", stats;
+  bool stopOnError = false;
 };
 
 /// Everything that flags change, in the scene itself.
@@ -86,7 +90,62 @@ void renderFrame(Scene& scene, int number, const RenderOptions& options, FrameLo
   run.frames.push_back(std::move(stats));
 }
 
-void render(const RenderOptions& options, const CommonOptions& common) {
+/// What became of a run's frames, "1-4" a line where neighbours fared alike.
+std::string frameTable(const RunStats& run, int step) {
+  struct Row {
+    int first, last;
+    std::string result;
+  };
+  std::map<int, std::string> results;
+  for (const FrameStats& done : run.frames) results[done.frame] = "written";
+  for (const FailedFrame& failed : run.failed) results[failed.frame] = failed.error;
+  std::vector<Row> rows;
+  for (const auto& [frame, result] : results) {
+    if (!rows.empty() && rows.back().result == result && rows.back().last + step == frame)
+      rows.back().last = frame;
+    else
+      rows.push_back({frame, frame, result});
+  }
+  std::string text;
+  for (const Row& row : rows) {
+    const std::string frames =
+        row.first == row.last ? fmt::format("{}", row.first) : fmt::format("{}-{}", row.first, row.last);
+    text += fmt::format("\n  {:>11}  {}", frames, row.result);
+  }
+  return text;
+}
+
+/// All frames; one that fails is noted, and the others go on. 0, or the exit code of the worst.
+int renderFrames(Scene& scene, const RenderOptions& options, Renderer& renderer, RunStats& run) {
+  FrameLoader loader(scene);
+  const Frames& frames = scene.frames;
+  const bool goOn = frames.first + frames.step <= frames.last && !options.stopOnError;
+  int exitCode = 0;
+  for (int number = frames.first; number <= frames.last; number += frames.step) {
+    const auto fail = [&](int code, const std::string& error) {
+      if (!goOn) throw;  // the error of the run
+      fmt::print(stderr, "mote: frame {}: {}\n", number, error);
+      run.failed.push_back({number, error});
+      takeWarnings();  // they are not the next frame's
+      exitCode = std::max(exitCode, code);
+    };
+    try {
+      renderFrame(scene, number, options, loader, renderer, run);
+    } catch (const InputError& error) {
+      fail(kBadInput, error.what());
+    } catch (const MachineError& error) {
+      fail(kMachine, error.what());
+    } catch (const std::bad_alloc&) {
+      fail(kMachine, "memory ran out");
+    }
+  }
+  if (!run.failed.empty())
+    fmt::print(stderr, "mote: {} of {} frames failed:{}\n", run.failed.size(), run.failed.size() + run.frames.size(),
+               frameTable(run, frames.step));
+  return exitCode;
+}
+
+int render(const RenderOptions& options, const CommonOptions& common) {
   Scene scene = openScene(options.scene);
   applyFlags(options, scene);
   parseExposure(options.exposure);
@@ -101,16 +160,15 @@ void render(const RenderOptions& options, const CommonOptions& common) {
   run.raster = backends.gpuRaster ? "gpu" : "cpu";
   run.threads = threadCount();
   Renderer renderer(backends, gpu.get());
-  FrameLoader loader(scene);
-  for (int number = scene.frames.first; number <= scene.frames.last; number += scene.frames.step)
-    renderFrame(scene, number, options, loader, renderer, run);
+  const int exitCode = renderFrames(scene, options, renderer, run);
   requireNoValidationMessages(gpu.get());
   if (!options.stats.empty()) writeWholeFile(options.stats, statsJson(run));
+  return exitCode;
 }
 
 }  // namespace
 
-void addRenderCommand(CLI::App& app, const CommonOptions& common, int&) {
+void addRenderCommand(CLI::App& app, const CommonOptions& common, int& exitCode) {
   auto options = std::make_shared<RenderOptions>();
   CLI::App* command = app.add_subcommand("render", "Render a scene to OpenEXR");
   addSceneOptions(*command, options->scene);
@@ -123,7 +181,9 @@ void addRenderCommand(CLI::App& app, const CommonOptions& common, int&) {
   command->add_option("--preview", options->preview, "Also write an sRGB preview")->type_name("OUT.png");
   command->add_option("--exposure", options->exposure, "Stops for the preview, or auto")->type_name("EV");
   command->add_option("--stats", options->stats, "Write counts, seconds and memory as JSON")->type_name("OUT.json");
-  command->callback([options, &common] { render(*options, common); });
+  command->add_flag("--stop-on-error", options->stopOnError,
+                    "End with the first frame that fails, instead of going on with the others");
+  command->callback([options, &common, &exitCode] { exitCode = render(*options, common); });
 }
 
 }  // namespace mote

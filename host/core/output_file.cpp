@@ -33,15 +33,17 @@ LivingTemporaries& livingTemporaries() {
   return *living;
 }
 
+constexpr int kSignalled = 128;  // and the signal's number: what shells make of it
+
 /// Takes one signal of the set and ends the process.
-[[noreturn]] void endOnSignal(sigset_t signals, int exitCode) {
+[[noreturn]] void endOnSignal(sigset_t signals) {
   int signal = 0;
   while (sigwait(&signals, &signal) != 0) {
   }
   LivingTemporaries& living = livingTemporaries();
   living.mutex.lock();
   for (const std::string& path : living.paths) ::unlink(path.c_str());
-  ::_exit(exitCode);  // no destructors: other threads are in the middle of their work
+  ::_exit(kSignalled + signal);  // no destructors: other threads are in the middle of their work
 }
 
 }  // namespace
@@ -111,7 +113,7 @@ void writeWholeFile(const std::string& path, const std::string& bytes) {
   file.commit();
 }
 
-void removeTemporaryFilesOnSignal(int exitCode) {
+void removeTemporaryFilesOnSignal() {
   // sigwait on a thread of its own, and not a handler: removing files needs locks, which handlers must not take.
   sigset_t signals;
   sigemptyset(&signals);
@@ -122,7 +124,7 @@ void removeTemporaryFilesOnSignal(int exitCode) {
   livingTemporaries();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   try {
-    std::thread(endOnSignal, signals, exitCode).detach();
+    std::thread(endOnSignal, signals).detach();
   } catch (const std::system_error& e) {
     throw MachineError(fmt::format("cannot start the thread that waits for signals: {}", e.what()));
   }

@@ -30,9 +30,9 @@ class OutputFile {
 void writeWholeFile(const std::string& path, const std::string& bytes);
 
 /// From now on SIGINT, SIGTERM and SIGHUP remove the temporaries of every living OutputFile and end the process with
-/// `exitCode`; what was committed before stays. Signals that the process was started to ignore (nohup) stay ignored.
-/// Call once, before any other thread starts: all threads must inherit the blocked signals. Throws MachineError where
-/// no thread can be started.
-void removeTemporaryFilesOnSignal(int exitCode);
+/// 128 + the signal, as shells have it (130, 143, 129); what was committed before stays. Signals that the process was
+/// started to ignore (nohup) stay ignored. Call once, before any other thread starts: all threads must inherit the
+/// blocked signals. Throws MachineError where no thread can be started.
+void removeTemporaryFilesOnSignal();
 
 }  // namespace mote

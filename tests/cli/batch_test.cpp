@@ -1,0 +1,93 @@
+// mote render of several frames where some fail: the others are as if nothing had been.
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "host/image/exr.h"
+#include "tests/cli/mote_program.h"
+
+namespace mote::test {
+namespace {
+
+using Json = nlohmann::json;
+
+/// Four frames of smoke, the second of which is cut off.
+class MoteRenderBatch : public testing::Test {
+ protected:
+  MoteRenderBatch() {
+    EXPECT_EQ(mote({"generate", "plume", "--count", "2000", "--frames", "1-4", "-o", folder_.file("p.#.prt")}).exitCode,
+              0);
+    whole_ = readBytes(damaged_);
+    writeBytes(damaged_, whole_.substr(0, whole_.size() / 2));
+    writeBytes(folder_.file("scene.json"), R"({"particles": [{"file": "p.#.prt"}], "output": {"size": [48, 32]},
+      "medium": {"density_scale": 0.001}, "camera": {"position": [0, 1, 6], "target": [0, 1, 0]},
+      "lights": [{"name": "key", "position": [2, 3, 1]}]})");
+  }
+
+  ProcessResult render(const std::string& pictures, std::vector<std::string> more = {}) const {
+    std::vector<std::string> arguments{"render", folder_.file("scene.json"), "--lighting", "cpu", "--raster", "cpu"};
+    more.insert(more.end(), {"--frames", "1-4", "-o", folder_.file(pictures), "--stats", folder_.file("stats.json")});
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return mote(arguments, kWithoutVulkan);
+  }
+  bool exists(const std::string& name) const { return std::filesystem::exists(folder_.file(name)); }
+
+  TempFolder folder_;
+  const std::string damaged_ = folder_.file("p.2.prt");
+  std::string whole_;
+};
+
+TEST_F(MoteRenderBatch, GoesOnBehindAFrameThatFails) {
+  const ProcessResult result = render("some.#.exr");
+  EXPECT_EQ(result.exitCode, 2);
+  EXPECT_TRUE(contains(result.err, "mote: frame 2: " + damaged_));
+  EXPECT_TRUE(contains(result.err, "mote: 1 of 4 frames failed:\n            1  written\n            2  " + damaged_));
+  EXPECT_TRUE(contains(result.err, "\n          3-4  written\n"));
+  EXPECT_FALSE(exists("some.2.exr"));
+
+  const Json stats = Json::parse(readBytes(folder_.file("stats.json")));
+  EXPECT_EQ(stats["frames"].size(), 3u);
+  ASSERT_EQ(stats["failed"].size(), 1u);
+  EXPECT_EQ(stats["failed"][0]["frame"], 2);
+  EXPECT_TRUE(contains(stats["failed"][0]["error"].get<std::string>(), "cut off"));
+
+  writeBytes(damaged_, whole_);
+  ASSERT_EQ(render("all.#.exr").exitCode, 0);
+  EXPECT_TRUE(Json::parse(readBytes(folder_.file("stats.json")))["failed"].empty());
+  for (const std::string frame : {"1", "3", "4"})
+    EXPECT_TRUE(readExr(folder_.file("some." + frame + ".exr")).pixels ==
+                readExr(folder_.file("all." + frame + ".exr")).pixels)
+        << frame;
+}
+
+TEST_F(MoteRenderBatch, StopsAtTheFirstThatFailsWhereAsked) {
+  const ProcessResult result = render("some.#.exr", {"--stop-on-error"});
+  EXPECT_EQ(result.exitCode, 2);
+  EXPECT_TRUE(contains(result.err, damaged_));
+  EXPECT_FALSE(contains(result.err, "frames failed"));
+  EXPECT_TRUE(exists("some.1.exr"));
+  EXPECT_FALSE(exists("some.2.exr") || exists("some.3.exr") || exists("some.4.exr"));
+}
+
+TEST_F(MoteRenderBatch, SaysOfItsOnlyFrameWhatIsWrongAndNoMore) {
+  const ProcessResult alone = mote({"render", folder_.file("scene.json"), "--lighting", "cpu", "--raster", "cpu",
+                                    "--frames", "2-2", "-o", folder_.file("alone.exr")},
+                                   kWithoutVulkan);
+  EXPECT_EQ(alone.exitCode, 2);
+  EXPECT_TRUE(contains(alone.err, "\nmote: " + damaged_));
+  EXPECT_FALSE(contains(alone.err, "frames failed"));
+}
+
+TEST_F(MoteRenderBatch, TheMachinesFailuresWeighMoreThanTheInputs) {
+  ProcessOptions full = kWithoutVulkan;
+  full.largestFile = 1024;  // less than a picture
+  const ProcessResult result = mote({"render", folder_.file("scene.json"), "--lighting", "cpu", "--raster", "cpu",
+                                     "--frames", "1-3", "-o", folder_.file("some.#.exr")},
+                                    full);
+  EXPECT_EQ(result.exitCode, 3);
+  EXPECT_TRUE(contains(result.err, "mote: 3 of 3 frames failed:"));
+  EXPECT_TRUE(contains(result.err, "\n            2  " + damaged_));
+  EXPECT_FALSE(exists("some.1.exr"));
+}
+
+}  // namespace
+}  // namespace mote::test
