@@ -11,8 +11,8 @@
 
 #include <cstring>
 
-#include "tests/support/drawn_file.h"
 #include "tests/support/opened_file.h"
+#include "tests/support/volume_facts.h"
 
 namespace mote {
 namespace {
@@ -50,10 +50,10 @@ const VolumeSampling kFew{.count = 1000, .seed = 4, .grid = ""};
 
 TEST(NanoVdbReader, DrawsVoxelsAndTilesOfEveryLevelInEveryCodec) {
   for (const io::Codec codec : kCodecs) {
-    const DrawnFile drawn(fog(codec), kFew);
+    const OpenedFile drawn(fog(codec), kFew);
     EXPECT_EQ(drawn.file->format(), "NanoVDB 32.4.2 (fog volume)");
     EXPECT_EQ(drawn.file->count(), 1000u);
-    EXPECT_NEAR(drawn.sum() / fogIntegral(), 1, 1e-7);
+    EXPECT_NEAR(densitySum(drawn) / fogIntegral(), 1, 1e-7);
     std::size_t inTile = 0;
     for (const dvec3& p : drawn.read<dvec3>("Position")) {
       const double j = (p.x - 10) / -0.25, k = (p.z - 30) / 2, i = (p.y - 20 - 0.125 * k) / 0.5;
@@ -74,34 +74,34 @@ TEST(NanoVdbReader, DrawsVoxelsAndTilesOfEveryLevelInEveryCodec) {
 
 TEST(NanoVdbReader, ChoosesAGridByNameOverSeveralSegments) {
   const std::string two = fog(io::Codec::ZIP, false) + fog(io::Codec::NONE);
-  EXPECT_NEAR(DrawnFile(two, kFew).sum() / fogIntegral(false), 1, 1e-7);  // the first of the name
-  expectDrawnRefused(two, {.count = {}, .seed = 0, .grid = "smoke"}, {"grid: expected", "'density'", "got 'smoke'"});
+  EXPECT_NEAR(densitySum(OpenedFile(two, kFew)) / fogIntegral(false), 1, 1e-7);  // the first of the name
+  expectFileRefused(two, {"grid: expected", "'density'", "got 'smoke'"}, {.count = {}, .seed = 0, .grid = "smoke"});
 }
 
 TEST(NanoVdbReader, SaysWhatItDoesNotRead) {
   const std::string surface = written(nanovdb::createLevelSetSphere<float>(), io::Codec::NONE);
-  expectDrawnRefused(surface, {}, {"a fog volume of float", "a level set of float"});
-  expectDrawnRefused(written(nanovdb::createFogVolumeSphere<double>(), io::Codec::NONE), {}, {"(double)"});
+  expectFileRefused(surface, {"a fog volume of float", "a level set of float"});
+  expectFileRefused(written(nanovdb::createFogVolumeSphere<double>(), io::Codec::NONE), {"(double)"});
   std::string version = fog(io::Codec::NONE);
   version[11] = 2;
-  expectDrawnRefused(version, {}, {"NanoVDB version: expected 32.3 or later", "got 16."});
+  expectFileRefused(version, {"NanoVDB version: expected 32.3 or later", "got 16."});
   std::string codec = fog(io::Codec::NONE);
   codec[14] = 7;
-  expectDrawnRefused(codec, {}, {"NanoVDB codec", "got 7"});
+  expectFileRefused(codec, {"NanoVDB codec", "got 7"});
   std::string inMemory = fog(io::Codec::NONE);
   inMemory[7] = '1';
-  expectDrawnRefused(inMemory, {}, {"a grid as it stands in memory"});
-  expectDrawnRefused("NanoVDB", {}, {"magic number", "only 7"});
+  expectFileRefused(inMemory, {"a grid as it stands in memory"});
+  expectFileRefused("NanoVDB", {"magic number", "only 7"});
 }
 
 TEST(NanoVdbReader, RefusesTruncationAtEveryByteOfItsHeadsAndOfAPackedGrid) {
   const std::string plain = fog(io::Codec::NONE);
   for (std::size_t size = 0; size < plain.size(); size += size < 2000 ? 1 : 997)
-    expectDrawnRefused(plain.substr(0, size), kFew, {});
+    expectFileRefused(plain.substr(0, size), {}, kFew);
   for (const io::Codec codec : {io::Codec::ZIP, io::Codec::BLOSC}) {
     const std::string packed = fog(codec);
     for (std::size_t size = 0; size < packed.size(); size += size < 400 ? 1 : 7)
-      expectDrawnRefused(packed.substr(0, size), kFew, {});
+      expectFileRefused(packed.substr(0, size), {}, kFew);
   }
 }
 
@@ -114,7 +114,7 @@ TEST(NanoVdbReader, SurvivesFlippedBits) {
       std::string bytes = whole;
       bytes[byte] = static_cast<char>(bytes[byte] ^ 1 << bit);
       try {
-        const DrawnFile opened(bytes, {.count = 16, .seed = 0, .grid = ""});
+        const OpenedFile opened(bytes, {.count = 16, .seed = 0, .grid = ""});
         EXPECT_EQ(opened.file->count(), 16u);
         opened.readAll();
       } catch (const InputError&) {
@@ -138,16 +138,16 @@ TEST(NanoVdbReader, RefusesHostileNumbersWithoutAllocating) {
     return bytes;
   };
   for (const std::uint64_t hostile : {~std::uint64_t{0}, std::uint64_t{1} << 62, std::uint64_t{1} << 40}) {
-    expectDrawnRefused(with(packed, 16, hostile), kFew, {"what", "can hold"});     // unpacked
-    expectDrawnRefused(with(packed, 24, hostile), kFew, {"the file is cut off"});  // in the file
-    expectDrawnRefused(with(plain, 40, hostile), kFew, {"active voxels, as its head says"});
+    expectFileRefused(with(packed, 16, hostile), {"what", "can hold"}, kFew);     // unpacked
+    expectFileRefused(with(packed, 24, hostile), {"the file is cut off"}, kFew);  // in the file
+    expectFileRefused(with(plain, 40, hostile), {"active voxels, as its head says"}, kFew);
     const std::size_t tree = 16 + 176 + 8 + 672;  // behind the heads, a name of 8 bytes and the grid's own
     for (std::size_t node = 0; node < 4; ++node)
-      expectDrawnRefused(with(plain, tree + 8 * node, hostile), kFew, {"within"});
+      expectFileRefused(with(plain, tree + 8 * node, hostile), {"within"}, kFew);
   }
   for (std::size_t level = 0; level < 3; ++level)
-    expectDrawnRefused(with(plain, 16 + 176 + 8 + 672 + 32 + 4 * level, 0xffffffff, 4), kFew, {"within"});
-  expectDrawnRefused(with(plain, 16 + 136, 0xffffffff, 4), kFew, {"name", "only"});  // of the name
+    expectFileRefused(with(plain, 16 + 176 + 8 + 672 + 32 + 4 * level, 0xffffffff, 4), {"within"}, kFew);
+  expectFileRefused(with(plain, 16 + 136, 0xffffffff, 4), {"name", "only"}, kFew);  // of the name
 }
 
 }  // namespace

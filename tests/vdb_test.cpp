@@ -12,9 +12,9 @@
 #include <map>
 
 #include "host/particles/particle_loader.h"
-#include "tests/support/drawn_file.h"
 #include "tests/support/opened_file.h"
 #include "tests/support/shared_data.h"
+#include "tests/support/volume_facts.h"
 
 namespace mote {
 namespace {
@@ -60,28 +60,28 @@ constexpr std::uint64_t kFogVoxels = 3 * 512 + 8;
 
 TEST(VdbReader, DrawsAFogVolumeWithItsTilesInEveryCompression) {
   for (const std::uint32_t compression : kCompressions) {
-    const DrawnFile drawn(vdb({fog()}, compression), {.count = 5000, .seed = 3, .grid = ""});
+    const OpenedFile drawn(vdb({fog()}, compression), {.count = 5000, .seed = 3, .grid = ""});
     EXPECT_EQ(drawn.file->format(), "OpenVDB 10.0 (fog volume)");
     EXPECT_TRUE(drawn.file->drawn());
     EXPECT_EQ(describeChannels(drawn.file->channels()), "Position (3 × float64), Density (float32), Radius (float32)");
     EXPECT_EQ(metadataNumber(*drawn.file, "active_voxels"), kFogVoxels);
     EXPECT_EQ(metadataNumber(*drawn.file, "tile_voxels"), 3 * 512);
     EXPECT_NEAR(metadataNumber(*drawn.file, "integral"), kFogIntegral, 1e-12);
-    EXPECT_NEAR(drawn.sum() / kFogIntegral, 1, 1e-7) << compression;
+    EXPECT_NEAR(densitySum(drawn) / kFogIntegral, 1, 1e-7) << compression;
     for (const dvec3& p : drawn.read<dvec3>("Position")) {
       ASSERT_TRUE(p.x >= 10 - 4.25 && p.x < 10 + 11.75 && p.y >= 19.75 && p.y < 23.75) << p.x << " " << p.y;
       ASSERT_TRUE(p.z >= 29.75 && p.z < 33.75) << p.z;
     }
   }
-  EXPECT_EQ(DrawnFile(vdb({fog()})).file->count(), kFogVoxels);
+  EXPECT_EQ(OpenedFile(vdb({fog()})).file->count(), kFogVoxels);
 }
 
 TEST(VdbReader, ReadsHalfAndDouble) {
   const auto half = fog();
   half->setSaveFloatAsHalf(true);
   for (const std::uint32_t compression : kCompressions) {
-    EXPECT_NEAR(DrawnFile(vdb({half}, compression)).sum() / kFogIntegral, 1, 1e-7);
-    EXPECT_NEAR(DrawnFile(vdb({fog<openvdb::DoubleGrid>()}, compression)).sum() / kFogIntegral, 1, 1e-7);
+    EXPECT_NEAR(densitySum(OpenedFile(vdb({half}, compression))) / kFogIntegral, 1, 1e-7);
+    EXPECT_NEAR(densitySum(OpenedFile(vdb({fog<openvdb::DoubleGrid>()}, compression))) / kFogIntegral, 1, 1e-7);
   }
 }
 
@@ -91,10 +91,10 @@ TEST(VdbReader, PlacesParticlesThroughAnyLinearTransform) {
   for (const auto& transform : {openvdb::math::Transform::createLinearTransform(turned),
                                 openvdb::math::Transform::createLinearTransform(0.25)}) {
     grid->setTransform(transform);
-    const DrawnFile drawn(vdb({grid}), {.count = 2000, .seed = 1, .grid = ""});
+    const OpenedFile drawn(vdb({grid}), {.count = 2000, .seed = 1, .grid = ""});
     const openvdb::Vec3d edges = transform->voxelSize();
     const double volume = transform->mapType() == "AffineMap" ? 24 : edges.x() * edges.y() * edges.z();
-    EXPECT_NEAR(drawn.sum() / (kFogIntegral * 8 * volume), 1, 1e-7);
+    EXPECT_NEAR(densitySum(drawn) / (kFogIntegral * 8 * volume), 1, 1e-7);
     for (const dvec3& p : drawn.read<dvec3>("Position")) {
       const openvdb::Coord at = transform->worldToIndexCellCentered(openvdb::Vec3d(p.x, p.y, p.z));
       ASSERT_TRUE(grid->tree().isValueOn(at)) << at;
@@ -110,7 +110,7 @@ TEST(VdbReader, SamplesVelocitiesWhereTheParticlesAre) {
     for (int x = -12; x < 28; ++x)
       for (int y = -4; y < 12; ++y)
         for (int z = -4; z < 12; ++z) velocity->tree().setValue({x, y, z}, openvdb::Vec3s(float(x), float(2 * y), 1));
-    const DrawnFile drawn(vdb({fog(), velocity}), {.count = 500, .seed = 1, .grid = ""});
+    const OpenedFile drawn(vdb({fog(), velocity}), {.count = 500, .seed = 1, .grid = ""});
     const std::vector<dvec3> at = drawn.read<dvec3>("Position");
     const std::vector<vec3> v = drawn.read<vec3>("Velocity");
     for (std::size_t i = 0; i < at.size(); ++i) {  // linear, so trilinear sampling is exact
@@ -125,13 +125,14 @@ TEST(VdbReader, ChoosesAGridByName) {
   const auto thin = fog("thin");
   for (auto value = thin->beginValueOn(); value; ++value) value.setValue(*value * 0.5f);
   const std::string both = vdb({fog("thick"), thin});
-  EXPECT_NEAR(DrawnFile(both, {.count = {}, .seed = 0, .grid = "thin"}).sum() / kFogIntegral, 0.5, 1e-7);
-  expectDrawnRefused(both, {}, {"grid: expected which of its grids is meant: 'thick', 'thin'", "\"grid\": \"thick\""});
-  expectDrawnRefused(both, {.count = {}, .seed = 0, .grid = "smoke"},
-                     {"grid: expected", "'thick', 'thin'", "got 'smoke'"});
-  EXPECT_NEAR(DrawnFile(vdb({thin, fog("density")})).sum() / kFogIntegral, 1, 1e-7);  // density without a word
-  EXPECT_NEAR(DrawnFile(vdb({fog("d"), fog("d")}), {.count = {}, .seed = 0, .grid = "d[1]"}).sum() / kFogIntegral, 1,
-              1e-7);
+  EXPECT_NEAR(densitySum(OpenedFile(both, {.count = {}, .seed = 0, .grid = "thin"})) / kFogIntegral, 0.5, 1e-7);
+  expectFileRefused(both, {"grid: expected which of its grids is meant: 'thick', 'thin'", "\"grid\": \"thick\""});
+  expectFileRefused(both, {"grid: expected", "'thick', 'thin'", "got 'smoke'"},
+                    {.count = {}, .seed = 0, .grid = "smoke"});
+  EXPECT_NEAR(densitySum(OpenedFile(vdb({thin, fog("density")}))) / kFogIntegral, 1, 1e-7);  // density without a word
+  EXPECT_NEAR(
+      densitySum(OpenedFile(vdb({fog("d"), fog("d")}), {.count = {}, .seed = 0, .grid = "d[1]"})) / kFogIntegral, 1,
+      1e-7);
 }
 
 TEST(VdbReader, ReadsAGridThatSharesItsTree) {
@@ -140,37 +141,37 @@ TEST(VdbReader, ReadsAGridThatSharesItsTree) {
   second->setTree(first->treePtr());
   second->setTransform(openvdb::math::Transform::createLinearTransform(1.0));
   const std::string bytes = vdb({first, second});
-  EXPECT_NEAR(DrawnFile(bytes, {.count = {}, .seed = 0, .grid = "a"}).sum() / kFogIntegral, 1, 1e-7);
-  EXPECT_NEAR(DrawnFile(bytes, {.count = {}, .seed = 0, .grid = "b"}).sum() / kFogIntegral, 8, 1e-6);
+  EXPECT_NEAR(densitySum(OpenedFile(bytes, {.count = {}, .seed = 0, .grid = "a"})) / kFogIntegral, 1, 1e-7);
+  EXPECT_NEAR(densitySum(OpenedFile(bytes, {.count = {}, .seed = 0, .grid = "b"})) / kFogIntegral, 8, 1e-6);
 }
 
 TEST(VdbReader, SaysWhatItDoesNotRead) {
   openvdb::initialize();
   const auto sphere = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(1, openvdb::Vec3f(0), 0.3f);
   sphere->setName("surface");
-  expectDrawnRefused(vdb({sphere}), {}, {"a fog volume", "'surface' (a level set", "is a surface"});
-  expectDrawnRefused(vdb({sphere, fog()}), {.count = {}, .seed = 0, .grid = "surface"},
-                     {"grid: expected", "a level set"});
-  EXPECT_NEAR(DrawnFile(vdb({sphere, fog()})).sum() / kFogIntegral, 1, 1e-7);
+  expectFileRefused(vdb({sphere}), {"a fog volume", "'surface' (a level set", "is a surface"});
+  expectFileRefused(vdb({sphere, fog()}), {"grid: expected", "a level set"},
+                    {.count = {}, .seed = 0, .grid = "surface"});
+  EXPECT_NEAR(densitySum(OpenedFile(vdb({sphere, fog()}))) / kFogIntegral, 1, 1e-7);
   const auto flags = openvdb::BoolGrid::create();
   flags->setName("flags");
-  expectDrawnRefused(vdb({flags}), {}, {"'flags' (Tree_bool_5_4_3)"});
+  expectFileRefused(vdb({flags}), {"'flags' (Tree_bool_5_4_3)"});
   const auto frustum = fog();
   frustum->setTransform(
       openvdb::math::Transform::createFrustumTransform(openvdb::BBoxd(openvdb::Vec3d(0), openvdb::Vec3d(10)), 0.5, 2));
-  expectDrawnRefused(vdb({frustum}), {}, {"a camera's frustum"});
+  expectFileRefused(vdb({frustum}), {"a camera's frustum"});
   std::string version = vdb({fog()});
   version[8] = static_cast<char>(221);
-  expectDrawnRefused(version, {}, {"OpenVDB file version: expected 222 to 224", "got 221"});
+  expectFileRefused(version, {"OpenVDB file version: expected 222 to 224", "got 221"});
   const TempFolder folder;
   {
     std::ofstream stream(folder.file("stream.vdb"), std::ios::binary);
     io::Stream(stream).write(openvdb::GridCPtrVec{fog()});
   }
-  expectDrawnRefused(readBytes(folder.file("stream.vdb")), {}, {"written as a stream"});
+  expectFileRefused(readBytes(folder.file("stream.vdb")), {"written as a stream"});
   const auto none = openvdb::FloatGrid::create();
   none->setName("density");
-  expectDrawnRefused(vdb({none}), {}, {"a density somewhere", "0 active voxels"});
+  expectFileRefused(vdb({none}), {"a density somewhere", "0 active voxels"});
 }
 
 // ---- points ----
@@ -203,7 +204,7 @@ openvdb::GridBase::Ptr pointGrid() {
 }
 
 /// By id, as the order is that of leaves.
-void expectTheFour(const DrawnFile& opened, double tolerance) {
+void expectTheFour(const OpenedFile& opened, double tolerance) {
   ASSERT_EQ(opened.file->count(), 4u);
   EXPECT_FALSE(opened.file->drawn());
   EXPECT_EQ(opened.file->format(), "OpenVDB 10.0 (points)");
@@ -233,23 +234,23 @@ void expectTheFour(const DrawnFile& opened, double tolerance) {
 
 TEST(VdbReader, ReadsPointsInEveryCodecAndCompression) {
   for (const std::uint32_t compression : kCompressions) {
-    expectTheFour(DrawnFile(vdb({pointGrid()}, compression)), 1e-7);  // places in a voxel are float
-    expectTheFour(DrawnFile(vdb({pointGrid<points::FixedPointCodec<false, points::PositionRange>>()}, compression)),
+    expectTheFour(OpenedFile(vdb({pointGrid()}, compression)), 1e-7);  // places in a voxel are float
+    expectTheFour(OpenedFile(vdb({pointGrid<points::FixedPointCodec<false, points::PositionRange>>()}, compression)),
                   0.5 / 65535);
-    expectTheFour(DrawnFile(vdb({pointGrid<points::FixedPointCodec<true, points::PositionRange>>()}, compression)),
+    expectTheFour(OpenedFile(vdb({pointGrid<points::FixedPointCodec<true, points::PositionRange>>()}, compression)),
                   0.5 / 255);
   }
 }
 
 TEST(VdbReader, PrefersPointsToVolumesAndRefusesToDrawFromThem) {
   const std::string both = vdb({fog(), pointGrid()});
-  expectTheFour(DrawnFile(both), 1e-7);
-  EXPECT_NEAR(DrawnFile(both, {.count = {}, .seed = 0, .grid = "density"}).sum() / kFogIntegral, 1, 1e-7);
-  expectDrawnRefused(both, {.count = 5, .seed = 0, .grid = ""},
-                     {"count: expected none", "holds 4 particles already", "got 5", "for volumes"});
-  expectDrawnRefused("1,2,3\n4,5,6\n", {.count = 5, .seed = 0, .grid = ""}, {"count: expected none", "got 5"});
-  expectDrawnRefused("1,2,3\n4,5,6\n", {.count = {}, .seed = 2, .grid = ""}, {"seed: expected none", "got 2"});
-  expectDrawnRefused("1,2,3\n4,5,6\n", {.count = {}, .seed = 0, .grid = "a"}, {"grid: expected none", "got 'a'"});
+  expectTheFour(OpenedFile(both), 1e-7);
+  EXPECT_NEAR(densitySum(OpenedFile(both, {.count = {}, .seed = 0, .grid = "density"})) / kFogIntegral, 1, 1e-7);
+  expectFileRefused(both, {"count: expected none", "holds 4 particles already", "got 5", "for volumes"},
+                    {.count = 5, .seed = 0, .grid = ""});
+  expectFileRefused("1,2,3\n4,5,6\n", {"count: expected none", "got 5"}, {.count = 5, .seed = 0, .grid = ""});
+  expectFileRefused("1,2,3\n4,5,6\n", {"seed: expected none", "got 2"}, {.count = {}, .seed = 2, .grid = ""});
+  expectFileRefused("1,2,3\n4,5,6\n", {"grid: expected none", "got 'a'"}, {.count = {}, .seed = 0, .grid = "a"});
 }
 
 TEST(VdbReader, ReadsManyPointsInManyLeaves) {
@@ -259,7 +260,7 @@ TEST(VdbReader, ReadsManyPointsInManyLeaves) {
     places.emplace_back(static_cast<float>(i % 40), static_cast<float>(i / 40 % 25), static_cast<float>(i / 1000));
   const auto transform = openvdb::math::Transform::createLinearTransform(0.7);
   const auto grid = points::createPointDataGrid<points::NullCodec, points::PointDataGrid>(places, *transform);
-  const DrawnFile opened(vdb({grid}));
+  const OpenedFile opened(vdb({grid}));
   ASSERT_EQ(opened.file->count(), places.size());
   std::vector<bool> seen(places.size());
   for (const dvec3& p : opened.read<dvec3>("Position")) {
@@ -343,7 +344,7 @@ TEST(VdbReader, PutsSmokeWhereOthersDo) {
 TEST(VdbReader, RefusesTruncationAtEveryByte) {
   for (const std::string& whole : {vdb({fog()}), vdb({pointGrid()})})
     for (std::size_t size = 0; size < whole.size(); ++size)
-      EXPECT_THROW(DrawnFile(whole.substr(0, size), {}).readAll(), InputError) << size << " of " << whole.size();
+      EXPECT_THROW(OpenedFile(whole.substr(0, size), {}).readAll(), InputError) << size << " of " << whole.size();
 }
 
 /// Every bit near a byte that is not 0, and of the long masks of nothing between them every 211th byte.
@@ -358,7 +359,7 @@ void expectFlippedBitsSurvived(const std::string& whole, const VolumeSampling& s
       std::string bytes = whole;
       bytes[byte] = static_cast<char>(bytes[byte] ^ 1 << bit);
       try {
-        const DrawnFile opened(bytes, sampling);
+        const OpenedFile opened(bytes, sampling);
         EXPECT_LE(opened.file->count(), mostParticles) << "byte " << byte << " bit " << bit;
         opened.readAll();
       } catch (const InputError&) {
@@ -408,7 +409,7 @@ TEST(VdbReader, RefusesSizesThatOpenVdbWouldBelieve) {
          {-1'000'000ll, -2049ll, 1ll << 62, -(1ll << 62), std::numeric_limits<long long>::min()}) {
       std::string bytes = whole;
       std::memcpy(&bytes[at], &wrong, sizeof wrong);
-      expectDrawnRefused(bytes, {}, {"at byte"});
+      expectFileRefused(bytes, {"at byte"});
       ++hostile;
     }
   }

@@ -81,7 +81,8 @@ void GridBlocks::setKernels(GridTile& tile, GridArrays& to) {
   std::uint32_t* const counts = start_.data() + 2;  // sortEntries
   to.kinds = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const CoveredNodes nodes = nodes_[i] == kAnyNodes ? setLone(tile, i, to.kernels[i]) : CoveredNodes(nodes_[i]);
+    const CoveredNodes nodes =
+        nodes_[i] == CoveredNodes::kAny ? setLone(tile, i, to.kernels[i]) : CoveredNodes(nodes_[i]);
     places_[i] = {};
     const int first = numberOf(tile, p.firstBin[i] >> 2);
     if (first < 0 || nodes.empty()) continue;
@@ -92,7 +93,9 @@ void GridBlocks::setKernels(GridTile& tile, GridArrays& to) {
                       static_cast<std::uint8_t>(block(nodes.endColumn - 1) - column + 1),
                       static_cast<std::uint8_t>(block(nodes.endRow - 1) - row + 1)};
     places_[i] = place;
-    to.kinds |= nodes_[i] == kAnyNodes ? kindOf(to.kernels[i]) : p.half[i] > 1 ? kEllipseKernels : kTentKernels;
+    to.kinds |= nodes_[i] == CoveredNodes::kAny ? kindOf(to.kernels[i])
+                : p.half[i] > 1                 ? kEllipseKernels
+                                                : kTentKernels;
     forEachBlock(place, groups, [&](std::uint32_t at, std::uint32_t really) { counts[at] += really; });
   }
 }

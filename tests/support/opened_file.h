@@ -18,9 +18,10 @@ struct OpenedFile {
   TempFolder folder;
   std::unique_ptr<ParticleFile> file;
 
-  explicit OpenedFile(const std::string& bytes) {
+  /// `sampling`: of a volume, what is drawn from it.
+  explicit OpenedFile(const std::string& bytes, const VolumeSampling& sampling = {}) {
     writeBytes(folder.file("particles"), bytes);
-    file = openParticleFile(folder.file("particles"));
+    file = openParticleFile(folder.file("particles"), sampling);
   }
   template <class T>
   std::vector<T> read(const std::string& channel) const {
@@ -36,9 +37,10 @@ struct OpenedFile {
 };
 
 /// Opening or reading it must throw an InputError whose message has these words.
-inline void expectFileRefused(const std::string& bytes, const std::vector<std::string>& words) {
+inline void expectFileRefused(const std::string& bytes, const std::vector<std::string>& words,
+                              const VolumeSampling& sampling = {}) {
   try {
-    OpenedFile(bytes).readAll();
+    OpenedFile(bytes, sampling).readAll();
     ADD_FAILURE() << "nothing was thrown; expected '" << (words.empty() ? "" : words[0]) << "'";
   } catch (const InputError& error) {
     for (const std::string& word : words)

@@ -174,6 +174,35 @@ struct LoneKernel {
   float scale = 0, own = 0;
 };
 
+/// Weights and GridParticles::own of a kernel that reaches farther, or is curved, are weighAlone's.
+constexpr float kMostReach = 32;
+
+/// Nodes first … end − 1 of a tile that a kernel covers, for who puts it down elsewhere: a device.
+struct CoveredNodes {
+  std::int32_t firstColumn = 0, endColumn = 0, firstRow = 0, endRow = 0;
+
+  /// More than a kernel has [cells]: a device may round otherwise.
+  static constexpr float kSlack = 1e-3f;
+  /// Of one that goes alone: its own constructor says which nodes.
+  static constexpr std::uint32_t kAny = ~std::uint32_t{0};
+
+  CoveredNodes() = default;
+  /// A byte each.
+  explicit CoveredNodes(std::uint32_t word)
+      : firstColumn(word & 255), endColumn(word >> 8 & 255), firstRow(word >> 16 & 255), endRow(word >> 24) {}
+  /// Of a kernel about (x, y) that goes so far.
+  CoveredNodes(float x, float y, float reach) {
+    constexpr float kEnd = kTileCells + 1;
+    const auto first = [&](float low) { return static_cast<std::int32_t>(std::ceil(std::clamp(low, 0.0f, kEnd))); };
+    const auto end = [&](float high) {
+      return static_cast<std::int32_t>(std::floor(std::clamp(high, -1.0f, kEnd - 1)) + 1);
+    };
+    firstColumn = first(x - (reach + kSlack)), endColumn = end(x + (reach + kSlack));
+    firstRow = first(y - (reach + kSlack)), endRow = end(y + (reach + kSlack));
+  }
+  bool empty() const { return firstColumn >= endColumn || firstRow >= endRow; }
+};
+
 /// The steps on vectors, the same bits on every instruction set.
 /// Places of points, bins included.
 void placePoints(const GridTile& tile, GridPoints& points);
@@ -184,32 +213,9 @@ LoneKernel weighAlone(const GridTile& tile, std::size_t particle);
 void putDownAlone(GridTile& tile, std::size_t particle);
 /// For who puts them down elsewhere, a device: their kernels, with weights for a peak of 1 where there are several
 /// channels, GridParticles::own, and of those that go by batches which of the tile's nodes they cover (CoveredNodes; of
-/// others kAnyNodes). Of those that are curved or reach farther than kMostReach, weights and own are not set, for
+/// others kAny). Of those that are curved or reach farther than kMostReach, weights and own are not set, for
 /// weighAlone. `kernels` and `nodes` have room for a step more.
-constexpr float kMostReach = 32;
-constexpr std::uint32_t kAnyNodes = ~std::uint32_t{0};
 void weighTile(GridTile& tile, layout::GridKernel* kernels, std::uint32_t* nodes);
-
-/// Nodes first … end − 1 of a tile, and 1/1000 of a cell more than a kernel has: who puts it down may round otherwise.
-struct CoveredNodes {
-  std::int32_t firstColumn = 0, endColumn = 0, firstRow = 0, endRow = 0;
-
-  CoveredNodes() = default;
-  /// A byte each.
-  explicit CoveredNodes(std::uint32_t word)
-      : firstColumn(word & 255), endColumn(word >> 8 & 255), firstRow(word >> 16 & 255), endRow(word >> 24) {}
-  /// Of a kernel about (x, y) that goes so far.
-  CoveredNodes(float x, float y, float reach) {
-    constexpr float kSlack = 1e-3f, kEnd = kTileCells + 1;
-    const auto first = [&](float low) { return static_cast<std::int32_t>(std::ceil(std::clamp(low, 0.0f, kEnd))); };
-    const auto end = [&](float high) {
-      return static_cast<std::int32_t>(std::floor(std::clamp(high, -1.0f, kEnd - 1)) + 1);
-    };
-    firstColumn = first(x - (reach + kSlack)), endColumn = end(x + (reach + kSlack));
-    firstRow = first(y - (reach + kSlack)), endRow = end(y + (reach + kSlack));
-  }
-  bool empty() const { return firstColumn >= endColumn || firstRow >= endRow; }
-};
 /// Puts down those that go by batches, and lists those that go alone.
 void putDownBatches(GridTile& tile);
 /// Every node's run of bins becomes the sums up to each bin's end.

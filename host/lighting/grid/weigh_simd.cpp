@@ -36,7 +36,7 @@ struct BatchWindow {
 HWY_INLINE auto coveredNodes(const GridParticles& p, std::size_t i) {
   const hn::RebindToSigned<decltype(kTag)> ints;
   const Vec half = load(&p.half[i]), zero = hn::Zero(kTag);
-  const Vec reach = hn::Add(hn::Max(half, set(1)), set(1e-3f));
+  const Vec reach = hn::Add(hn::Max(half, set(1)), set(CoveredNodes::kSlack));
   const auto first = [&](Vec at) {
     const Vec low = hn::Min(hn::Max(hn::Sub(at, reach), zero), set(kTileCells + 1));
     return hn::ConvertTo(ints, hn::Ceil(low));

@@ -56,10 +56,6 @@ class GzipFile {
   /// As many as there are: fewer than `wanted` only at the end. Throws InputError where the packed data are damaged.
   std::size_t read(std::byte* to, std::size_t wanted) const;
 
-  /// Deflate's best case: 258 bytes from two bits, less the heads of its blocks (zlib.net, "Maximum Compression
-  /// Factor").
-  static constexpr std::uint64_t kMostExpansion = 1032;
-
  private:
   struct Close {
     void operator()(void* file) const;

@@ -51,6 +51,8 @@ VdbTree checkedTree(const InputFile& file, const VdbLayout& layout, const VdbGri
   return tree;
 }
 
+constexpr char kSurfaceHint[] = "a level set is a surface: vdb_tool or Houdini's Convert VDB make a fog volume of it";
+
 std::string formatName(const VdbLayout& layout, const char* what) {
   return fmt::format("OpenVDB {}.{} ({})", layout.libraryMajor, layout.libraryMinor, what);
 }
@@ -166,11 +168,10 @@ std::unique_ptr<ParticleFile> openVdb(const std::string& path, const VolumeSampl
   if (!sampling.grid.empty())
     for (const VdbGrid& grid : layout.grids)
       if (grid.name == sampling.grid && !isPoints(grid) && !isVolume(grid))
-        throw InputError(path, "grid", "points, or a fog volume of float or double", described(grid),
-                         "a level set is a surface: vdb_tool or Houdini's Convert VDB make a fog volume of it");
+        throw InputError(path, "grid", "points, or a fog volume of float or double", described(grid), kSurfaceHint);
   if (usable.empty())
     throw InputError(path, "", "a grid of points, or a fog volume of float or double", described(layout.grids),
-                     "a level set is a surface: vdb_tool or Houdini's Convert VDB make a fog volume of it");
+                     kSurfaceHint);
   const VdbGrid& grid = *usable[chosenGrid(path, names, sampling.grid)];
   if (isVolume(grid)) return openVolume(file, layout, grid, sampling);
   constexpr std::uint32_t kPointsVersion = 224;  // before it they were stored otherwise
