@@ -79,15 +79,21 @@ GridDevice::Sizes GridDevice::sizesOf(const GridCounts& counts, const Manner& ma
           manner.channels * counts.receivers * kFloat};
 }
 
+GridDevice::Sizes GridDevice::noTiles() {
+  Sizes sizes{};
+  sizes[kStored] = layout::kBlockPairs * sizeof(layout::GridPair);
+  return sizes;
+}
+
 void GridDevice::release() {
   kernelTexels_ = {}, entryTexels_ = {}, sumTexels_ = {}, storedTexels_ = {}, tableTexels_ = {}, receiverTexels_ = {};
   buffers_ = {};
 }
 
 bool GridDevice::texelsFit(const Sizes& sizes) const {
-  const std::uint64_t longest =
-      std::max({sizes[0] / kKernelTexelBytes, sizes[2] / kPairBytes, sizes[4] / kPairBytes, sizes[7] / kPairBytes,
-                sizes[8] / kPairBytes, sizes[9] / sizeof(layout::GridReceiver)});
+  const std::uint64_t longest = std::max(
+      {sizes[kKernels] / kKernelTexelBytes, sizes[kEntries] / kPairBytes, sizes[kSums] / kPairBytes,
+       sizes[kStored] / kPairBytes, sizes[kTable] / kPairBytes, sizes[kReceivers] / sizeof(layout::GridReceiver)});
   return longest <= device_.mostTexels();
 }
 
@@ -124,20 +130,20 @@ void GridDevice::makeRoom(const Sizes& sizes) {
 std::vector<GridWorks> GridDevice::upload(std::span<const GridArrays* const> tiles, const Sizes& sizes,
                                           std::size_t channels) {
   const Buffers& to = buffers_;
-  const Filling<layout::GridKernel> kernels(device_, to.kernels, sizes[0]);
-  const Filling<float> peaks(device_, to.peaks, sizes[1]);
-  const Filling<std::uint32_t> entries(device_, to.entries, sizes[2]);
-  const Filling<std::uint32_t> blocks(device_, to.blocks, sizes[5]);
-  const Filling<layout::GridStrand> strands(device_, to.strands, sizes[6]);
-  const Filling<layout::GridEntryPair> table(device_, to.table, sizes[8]);
-  const Filling<layout::GridReceiver> receivers(device_, to.receivers, sizes[9]);
-  const Filling<float> own(device_, to.depths, sizes[10]);
+  const Filling<layout::GridKernel> kernels(device_, to.kernels, sizes[kKernels]);
+  const Filling<float> peaks(device_, to.peaks, sizes[kPeaks]);
+  const Filling<std::uint32_t> entries(device_, to.entries, sizes[kEntries]);
+  const Filling<std::uint32_t> blocks(device_, to.blocks, sizes[kBlocks]);
+  const Filling<layout::GridStrand> strands(device_, to.strands, sizes[kStrands]);
+  const Filling<layout::GridEntryPair> table(device_, to.table, sizes[kTable]);
+  const Filling<layout::GridReceiver> receivers(device_, to.receivers, sizes[kReceivers]);
+  const Filling<float> own(device_, to.depths, sizes[kDepths]);
   join(tiles, channels,
        {kernels.elements, peaks.elements, entries.elements, blocks.elements, strands.elements, table.elements,
         receivers.elements, own.elements});
   kernels.finish(), peaks.finish(), entries.finish(), blocks.finish(), strands.finish(), table.finish();
   receivers.finish(), own.finish();
-  const Filling<layout::GridWork> works(device_, to.works, sizes[3]);
+  const Filling<layout::GridWork> works(device_, to.works, sizes[kWorks]);
   const std::vector<GridWorks> all = joinWorks(tiles, groupSize_, works.elements);
   works.finish();
   return all;
@@ -166,7 +172,7 @@ void GridDevice::fillNodes(CommandBuffer& commands, std::span<const GridWorks> a
 }
 
 std::vector<float> GridDevice::run(std::span<const GridArrays* const> tiles, const Manner& manner) {
-  Sizes sizes = kNoTiles;
+  Sizes sizes = noTiles();
   for (const GridArrays* tile : tiles) sizes = sum(sizes, sizesOf(tile->counts(), manner));
   makeRoom(sizes);
   const std::vector<GridWorks> works = upload(tiles, sizes, manner.channels);
@@ -178,9 +184,9 @@ std::vector<float> GridDevice::run(std::span<const GridArrays* const> tiles, con
   if (read_.handle() == VK_NULL_HANDLE)
     read_ = device_.createComputePipeline(spirv::grid_read_comp, sizeof(layout::GridParams),
                                           std::array<SpecializationConstant, 1>{{{0, groupSize_}}}, 3);
-  const std::size_t kernels = sizes[0] / sizeof(layout::GridKernel);
-  const std::size_t receivers = sizes[9] / sizeof(layout::GridReceiver),
-                    strands = sizes[6] / sizeof(layout::GridStrand);
+  const std::size_t kernels = sizes[kKernels] / sizeof(layout::GridKernel);
+  const std::size_t receivers = sizes[kReceivers] / sizeof(layout::GridReceiver),
+                    strands = sizes[kStrands] / sizeof(layout::GridStrand);
   layout::GridParams of = params(manner.cell);
   queries_.reset();
   device_.run([&](CommandBuffer& commands) {
@@ -208,7 +214,7 @@ std::vector<float> GridDevice::run(std::span<const GridArrays* const> tiles, con
 }
 
 std::size_t GridDevice::batchThatFits(std::span<const GridArrays* const> tiles, const Manner& manner) {
-  Sizes sizes = kNoTiles;
+  Sizes sizes = noTiles();
   for (std::size_t count = 0; count < tiles.size(); ++count) {
     sizes = sum(sizes, sizesOf(tiles[count]->counts(), manner));
     const bool tooLong = count > 0 && std::accumulate(sizes.begin(), sizes.end(), std::uint64_t{0}) > kBatchBytes;
@@ -230,7 +236,7 @@ std::vector<float> GridDevice::runInParts(const GridArrays& tile, const Manner& 
   };
   Manner one = manner;
   one.channels = 1;
-  const auto sizes = [&](std::uint64_t share) { return sum(kNoTiles, sizesOf(most(share), one)); };
+  const auto sizes = [&](std::uint64_t share) { return sum(noTiles(), sizesOf(most(share), one)); };
   const auto arrays = [&](std::uint64_t share) {
     const Sizes of = sizes(share);
     return std::vector<std::uint64_t>(of.begin(), of.end());

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "engine/passes/grid_blocks.h"
+#include "engine/passes/grid_join.h"
 #include "engine/vulkan/device.h"
 
 namespace mote {
@@ -43,19 +43,32 @@ class GridDevice {
     bool colours;
     auto operator<=>(const FillVariant&) const = default;
   };
-  static constexpr std::size_t kArrays = 11;
+  enum Array : std::size_t {
+    kKernels,
+    kPeaks,
+    kEntries,
+    kWorks,
+    kSums,
+    kBlocks,
+    kStrands,
+    kStored,
+    kTable,
+    kReceivers,
+    kDepths,
+    kArrays
+  };
   struct Buffers {
     Buffer kernels, peaks, entries, works, sums, blocks, strands, stored, table, receivers, depths;
     std::array<Buffer*, kArrays> all() {
       return {&kernels, &peaks, &entries, &works, &sums, &blocks, &strands, &stored, &table, &receivers, &depths};
     }
   };
-  /// Bytes of each, in that order.
+  /// Bytes of each Array.
   using Sizes = std::array<std::uint64_t, kArrays>;
   const ComputePipeline& fill(const FillVariant& variant);
-  /// The block of zeros.
-  static constexpr Sizes kNoTiles{0, 0, 0, 0, 0, 0, 0, layout::kBlockPairs * sizeof(layout::GridPair), 0, 0, 0};
   static Sizes sizesOf(const GridCounts& counts, const Manner& manner);
+  /// Of no tile: the block of zeros.
+  static Sizes noTiles();
   static Sizes sum(const Sizes& a, const Sizes& b);
   bool fits(const Sizes& sizes);
   /// Whether texel views can be as long as what is read through them.
