@@ -7,11 +7,11 @@ cd -- "$(dirname -- "${BASH_SOURCE[0]}")/../.."
 
 # Which tests write files for which target. A new target has a line here.
 declare -A writers=(
-  [prt]="prt_test writer_test" [prt2]="prt2_test writer_test"
+  [prt]="prt_test prt_writer_test writer_test" [prt2]="prt2_test writer_test"
   [npy]="npy_test writer_test" [npz]=npz_test [ply]="ply_test writer_test" [csv]="csv_test writer_test"
   [vtk]=vtk_test [vtk_xml]=vtk_xml_test [bgeo]=bgeo_test [houdini]=houdini_test [hdf5]=hdf5_test
   [vdb]=vdb_test [nanovdb]=nanovdb_test
-  [salvage]="salvage_test prt_test prt2_test" [gltf]="gltf_import_test solids_test" [scene]=gltf_import_test
+  [salvage]="salvage_test prt_test prt2_test" [gltf]="gltf_import_test gltf_errors_test solids_test" [scene]=gltf_import_test
 )
 targets=("$@")
 if [[ $# -eq 0 ]]; then mapfile -t targets < <(printf '%s\n' "${!writers[@]}" | sort); fi

@@ -10,6 +10,7 @@
 #include "host/core/error.h"
 #include "host/core/log.h"
 #include "host/particles/formats/particle_file.h"
+#include "tests/support/refusal.h"
 #include "tests/support/temp_folder.h"
 
 namespace mote::test {
@@ -39,13 +40,7 @@ struct OpenedFile {
 /// Opening or reading it must throw an InputError whose message has these words.
 inline void expectFileRefused(const std::string& bytes, const std::vector<std::string>& words,
                               const VolumeSampling& sampling = {}) {
-  try {
-    OpenedFile(bytes, sampling).readAll();
-    ADD_FAILURE() << "nothing was thrown; expected '" << (words.empty() ? "" : words[0]) << "'";
-  } catch (const InputError& error) {
-    for (const std::string& word : words)
-      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << word << " is not in: " << error.what();
-  }
+  expectRefused([&] { OpenedFile(bytes, sampling).readAll(); }, words);
 }
 
 /// Opens and reads the file with each of its bits flipped. It must be refused, as it is at least once, or read, with no
