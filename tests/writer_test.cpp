@@ -262,7 +262,8 @@ TEST(OutputFormat, IsPickedByTheNamesEnd) {
   EXPECT_FALSE(outputFormatNamed("prt3"));
 }
 
-/// The same cloud, in every format, is the same particles to the last bit: of the types that all formats have.
+/// The same cloud, in every format that is written, is the same particles to the last bit: of the types that all of
+/// them have. (same_cloud_test.cpp: those that are only read.)
 TEST(FormatsTruth, OneCloudIsTheSameInEveryFormat) {
   const auto smoke = openParticleFile(sharedFile("smoke1/smoke1_350k_power05.prt"));
   constexpr std::size_t kCount = 5'000;
