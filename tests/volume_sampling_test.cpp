@@ -14,9 +14,9 @@
 #include "host/particles/formats/volume_sampler.h"
 #include "host/particles/particle_loader.h"
 #include "host/particles/spacing.h"
-#include "tests/support/drawn_file.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/temp_folder.h"
+#include "tests/support/volume_facts.h"
 
 namespace mote {
 namespace {
