@@ -85,9 +85,9 @@ std::string statsJson(const RunStats& run) {
   }
   Json failed = Json::array();
   for (const FailedFrame& frame : run.failed) failed.push_back({{"frame", frame.frame}, {"error", frame.error}});
-  const Json root = {{"version", MOTE_VERSION},    {"device", run.device},   {"lighting", run.lighting},
-                     {"raster", run.raster},       {"threads", run.threads}, {"frames", std::move(frames)},
-                     {"failed", std::move(failed)}};
+  const Json root = {{"version", MOTE_VERSION},     {"device", run.device},   {"lighting", run.lighting},
+                     {"raster", run.raster},        {"threads", run.threads}, {"frames", std::move(frames)},
+                     {"failed", std::move(failed)}, {"skipped", run.skipped}};
   return root.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

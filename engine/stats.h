@@ -50,8 +50,10 @@ struct RunStats {
   std::string device = "none";   ///< Vulkan device in use
   std::string lighting, raster;  ///< "cpu" or "gpu"
   unsigned threads = 0;
+  std::string settings;            ///< SHA-256 of everything but the input files that a picture may depend on
   std::vector<FrameStats> frames;  ///< that were written
   std::vector<FailedFrame> failed;
+  std::vector<int> skipped;  ///< that were there already (--resume)
 };
 
 /// Most memory this process ever held [bytes].

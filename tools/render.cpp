@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
 #include <map>
 #include <new>
 
@@ -15,6 +16,7 @@
 #include "host/image/png.h"
 #include "host/scene/frame_path.h"
 #include "host/scene/sequence.h"
+#include "tools/resume.h"
 
 namespace mote {
 namespace {
@@ -22,7 +24,7 @@ namespace {
 struct RenderOptions {
   SceneOptions scene;
   std::string output, frames, size, lighting, raster, preview, exposure = "auto", stats;
-  bool stopOnError = false;
+  bool stopOnError = false, resume = false;
 };
 
 /// Everything that flags change, in the scene itself.
@@ -68,15 +70,15 @@ std::string stageSeconds(const FrameStats& stats) {
   return text;
 }
 
-/// Draws frame `number`; what follows it begins to load as soon as the scene is settled.
-void renderFrame(Scene& scene, int number, const RenderOptions& options, FrameLoader& loader, Renderer& renderer,
-                 RunStats& run) {
+/// Draws frame `number`; `next` begins to load as soon as the scene is `settled`.
+void renderFrame(Scene& scene, int number, std::optional<int> next, const RenderOptions& options, FrameLoader& loader,
+                 Renderer& renderer, RunStats& run, bool& settled) {
   FrameStats stats;
   Timer total;
   const std::string path = framePath(scene.output.file, number);
   const Frame frame = prepareFrame(scene, loader.take(number), stats);
-  const int next = number + scene.frames.step;
-  if (next <= scene.frames.last) loader.prefetch(next);
+  settled = true;
+  if (next) loader.prefetch(*next);
   const Image image = renderer.draw(frame, scene, renderer.light(frame, lightWanted(scene), stats), stats);
   Timer write;
   stats.warnings = takeWarnings();
@@ -99,6 +101,7 @@ std::string frameTable(const RunStats& run, int step) {
   std::map<int, std::string> results;
   for (const FrameStats& done : run.frames) results[done.frame] = "written";
   for (const FailedFrame& failed : run.failed) results[failed.frame] = failed.error;
+  for (const int frame : run.skipped) results[frame] = "there already";
   std::vector<Row> rows;
   for (const auto& [frame, result] : results) {
     if (!rows.empty() && rows.back().result == result && rows.back().last + step == frame)
@@ -115,22 +118,65 @@ std::string frameTable(const RunStats& run, int step) {
   return text;
 }
 
-/// All frames; one that fails is noted, and the others go on. 0, or the exit code of the worst.
-int renderFrames(Scene& scene, const RenderOptions& options, Renderer& renderer, RunStats& run) {
-  FrameLoader loader(scene);
-  const Frames& frames = scene.frames;
-  const bool goOn = frames.first + frames.step <= frames.last && !options.stopOnError;
-  int exitCode = 0;
-  for (int number = frames.first; number <= frames.last; number += frames.step) {
+/// The frames that are to be drawn; with --resume the others are noted as skipped.
+std::vector<int> framesToDraw(const Scene& scene, const RenderOptions& options, RunStats& run) {
+  std::vector<int> frames;
+  for (int number = scene.frames.first; number <= scene.frames.last; number += scene.frames.step) {
+    const bool there = options.resume &&
+                       isRendered(framePath(scene.output.file, number), scene, number, run.settings) &&
+                       (options.preview.empty() || std::filesystem::exists(framePath(options.preview, number)));
+    (there ? run.skipped : frames).push_back(number);
+  }
+  if (options.resume)
+    logInfo(fmt::format("resume: {} of {} frames are there already", run.skipped.size(),
+                        run.skipped.size() + frames.size()));
+  return frames;
+}
+
+/// Frames in their order; one that fails is noted, and the others go on.
+class Batch {
+ public:
+  Batch(Scene& scene, const RenderOptions& options, Renderer& renderer, RunStats& run)
+      : scene_(scene), options_(options), renderer_(renderer), run_(run), loader_(scene) {}
+
+  /// 0, or the exit code of the worst.
+  int render() {
+    const std::vector<int> frames = framesToDraw(scene_, options_, run_);
+    goOn_ = frames.size() + run_.skipped.size() > 1 && !options_.stopOnError;
+    auto skipped = run_.skipped.begin();
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+      for (; skipped != run_.skipped.end() && *skipped < frames[k]; ++skipped) settleBy(*skipped);
+      draw(frames[k], k + 1 < frames.size() ? std::optional(frames[k + 1]) : std::nullopt);
+    }
+    if (!run_.failed.empty())
+      fmt::print(stderr, "mote: {} of {} frames failed:{}\n", run_.failed.size(),
+                 run_.failed.size() + run_.frames.size() + run_.skipped.size(), frameTable(run_, scene_.frames.step));
+    return exitCode_;
+  }
+
+ private:
+  /// What the scene leaves open is as in the run that is resumed.
+  void settleBy(int number) {
+    if (settled_) return;
+    try {
+      FrameStats ignored;
+      prepareFrame(scene_, number, ignored);
+      settled_ = true;
+    } catch (const std::exception&) {
+      // Its picture is there, and what is wrong with it now was not then.
+    }
+    takeWarnings();
+  }
+  void draw(int number, std::optional<int> next) {
     const auto fail = [&](int code, const std::string& error) {
-      if (!goOn) throw;  // the error of the run
+      if (!goOn_) throw;  // the error of the run
       fmt::print(stderr, "mote: frame {}: {}\n", number, error);
-      run.failed.push_back({number, error});
+      run_.failed.push_back({number, error});
       takeWarnings();  // they are not the next frame's
-      exitCode = std::max(exitCode, code);
+      exitCode_ = std::max(exitCode_, code);
     };
     try {
-      renderFrame(scene, number, options, loader, renderer, run);
+      renderFrame(scene_, number, next, options_, loader_, renderer_, run_, settled_);
     } catch (const InputError& error) {
       fail(kBadInput, error.what());
     } catch (const MachineError& error) {
@@ -139,11 +185,15 @@ int renderFrames(Scene& scene, const RenderOptions& options, Renderer& renderer,
       fail(kMachine, "memory ran out");
     }
   }
-  if (!run.failed.empty())
-    fmt::print(stderr, "mote: {} of {} frames failed:{}\n", run.failed.size(), run.failed.size() + run.frames.size(),
-               frameTable(run, frames.step));
-  return exitCode;
-}
+
+  Scene& scene_;
+  const RenderOptions& options_;
+  Renderer& renderer_;
+  RunStats& run_;
+  FrameLoader loader_;
+  bool goOn_ = false, settled_ = false;
+  int exitCode_ = 0;
+};
 
 int render(const RenderOptions& options, const CommonOptions& common) {
   Scene scene = openScene(options.scene);
@@ -159,8 +209,9 @@ int render(const RenderOptions& options, const CommonOptions& common) {
   run.lighting = backends.gpuLighting ? "gpu" : "cpu";
   run.raster = backends.gpuRaster ? "gpu" : "cpu";
   run.threads = threadCount();
+  run.settings = settingsOf(scene, run);
   Renderer renderer(backends, gpu.get());
-  const int exitCode = renderFrames(scene, options, renderer, run);
+  const int exitCode = Batch(scene, options, renderer, run).render();
   requireNoValidationMessages(gpu.get());
   if (!options.stats.empty()) writeWholeFile(options.stats, statsJson(run));
   return exitCode;
@@ -181,6 +232,8 @@ void addRenderCommand(CLI::App& app, const CommonOptions& common, int& exitCode)
   command->add_option("--preview", options->preview, "Also write an sRGB preview")->type_name("OUT.png");
   command->add_option("--exposure", options->exposure, "Stops for the preview, or auto")->type_name("EV");
   command->add_option("--stats", options->stats, "Write counts, seconds and memory as JSON")->type_name("OUT.json");
+  command->add_flag("--resume", options->resume,
+                    "Leave out frames whose picture is whole and was made from the same files and settings");
   command->add_flag("--stop-on-error", options->stopOnError,
                     "End with the first frame that fails, instead of going on with the others");
   command->callback([options, &common, &exitCode] { exitCode = render(*options, common); });

@@ -90,6 +90,7 @@ void writeFrameExr(const std::string& path, const Image& image, const Frame& fra
   options.frame = frame.number;
   options.pixelAspectRatio = scene.output.pixelAspect;
   options.strings = {{"mote:version", MOTE_VERSION}, {"mote:stats", reproducibleStatsJson(run, stats)}};
+  if (!run.settings.empty()) options.strings["mote:settings"] = run.settings;
   if (const dvec3& o = stats.origin; o != dvec3(0))  // what the matrices' world begins at
     options.strings["mote:origin"] = fmt::format("{} {} {}", o.x, o.y, o.z);
   if (!image.depth.empty())  // others write the distance from the camera, or that to the first of all samples

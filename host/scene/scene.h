@@ -216,6 +216,7 @@ struct InputRules {
 };
 
 struct Scene {
+  std::string settings;               ///< sceneSettings of the file, as it was read
   std::string path;                   ///< as given; the place in messages
   std::vector<std::string> imported;  ///< files that "import" was read from, as opened
   std::vector<ParticleSource> particles;

@@ -10,6 +10,7 @@
 
 #include "host/core/error.h"
 #include "host/scene/scene_parts.h"
+#include "host/scene/scene_settings.h"
 
 namespace mote {
 namespace {
@@ -94,6 +95,7 @@ Scene parseScene(std::string_view text, const std::string& path, std::span<const
   ObjectReader root(reading, "the scene");
   Scene scene = readWhole(root, path);
   reading.throwFirst();
+  scene.settings = sceneSettings(document.root());
   return scene;
 }
 

@@ -89,5 +89,43 @@ TEST_F(MoteRenderBatch, TheMachinesFailuresWeighMoreThanTheInputs) {
   EXPECT_FALSE(exists("some.1.exr"));
 }
 
+TEST_F(MoteRenderBatch, ResumesWhereFramesAreMissingOrNotWhatTheyWere) {
+  writeBytes(damaged_, whole_);
+  // The scene leaves the camera, the density and the light open: the first frame settles them.
+  writeBytes(folder_.file("scene.json"), R"({"particles": [{"file": "p.#.prt"}], "output": {"size": [48, 32]}})");
+  const auto resumed = [&](std::vector<std::string> more = {}) {
+    more.insert(more.begin(), "--resume");
+    const ProcessResult result = render("p.#.exr", more);
+    EXPECT_EQ(result.exitCode, 0) << result.err;
+    return Json::parse(readBytes(folder_.file("stats.json")))["skipped"].get<std::vector<int>>();
+  };
+  using Frames = std::vector<int>;
+  ASSERT_EQ(render("p.#.exr").exitCode, 0);
+  std::vector<std::string> first;
+  for (const std::string frame : {"1", "2", "3", "4"}) first.push_back(readBytes(folder_.file("p." + frame + ".exr")));
+  EXPECT_EQ(resumed(), (Frames{1, 2, 3, 4}));
+
+  std::filesystem::remove(folder_.file("p.2.exr"));
+  const std::string third = folder_.file("p.3.exr");
+  writeBytes(third, first[2].substr(0, first[2].size() / 2));
+  EXPECT_EQ(resumed(), (Frames{1, 4}));
+  for (const int frame : {1, 2, 3, 4})
+    EXPECT_EQ(readBytes(folder_.file("p." + std::to_string(frame) + ".exr")), first[frame - 1]) << frame;
+
+  // Another file, the same settings.
+  ASSERT_EQ(mote({"generate", "plume", "--count", "2000", "--seed", "7", "-o", folder_.file("p.4.prt")}).exitCode, 0);
+  EXPECT_EQ(resumed(), (Frames{1, 2, 3}));
+  EXPECT_NE(readBytes(folder_.file("p.4.exr")), first[3]);
+  // The same scene in other words, other settings, another size.
+  writeBytes(folder_.file("scene.json"),
+             R"({ /* small */ "output": {"size": [48.0, 32]}, "particles": [{"file": "p.#.prt"}]})");
+  EXPECT_EQ(resumed(), (Frames{1, 2, 3, 4}));
+  EXPECT_EQ(resumed({"--set", "/medium/optical_depth=3"}), Frames{});
+  EXPECT_EQ(resumed({"--size", "32x32"}), Frames{});
+  EXPECT_EQ(resumed({"--size", "32x32"}), (Frames{1, 2, 3, 4}));
+  // A preview that is wanted and not there.
+  EXPECT_EQ(resumed({"--size", "32x32", "--preview", folder_.file("p.#.png")}), Frames{});
+}
+
 }  // namespace
 }  // namespace mote::test
