@@ -181,7 +181,7 @@ TEST(PrtReader, RefusesBadHeaderLengthsAndTables) {
   expectRefused(file, {"channel table", "2147483647 records"});
   file = {};
   file.channels.assign(5000, {"A", 1, 1, 0});
-  expectRefused(file, {"channels", "at most 4096", "5000"});
+  expectRefused(file, {"channels", "at most 1024", "5000"});
 }
 
 TEST(PrtReader, SkipsWhatLongerRecordsAndHeadersAdd) {

@@ -382,6 +382,26 @@ TEST(VdbReader, TriesOutPackedValuesOfNodes) {
   }
 }
 
+/// OpenVDB goes through all nodes in each pass, of which a file without points may claim 65535.
+TEST(VdbReader, RefusesPassesWithoutEnd) {
+  const auto empty = points::PointDataGrid::create();
+  empty->setName("points");
+  empty->tree().addTile(2, {0, 0, 0}, 0, false);  // a node of 4096³ voxels with nothing in it
+  std::string bytes = vdb({empty});
+  EXPECT_EQ(OpenedFile(bytes).file->count(), 0u);
+  std::size_t refused = 0;
+  for (std::size_t at = bytes.size() - 2; at > bytes.size() - 64; --at) {
+    std::string hostile = bytes;
+    hostile.replace(at, 2, "\xff\xff");
+    try {
+      OpenedFile(hostile).readAll();
+    } catch (const InputError& error) {
+      refused += std::string(error.what()).find("number of passes at byte") != std::string::npos;
+    }
+  }
+  EXPECT_EQ(refused, 1u);
+}
+
 TEST(VdbReader, SurvivesFlippedBitsInVolumes) {
   const auto half = fog();
   half->setSaveFloatAsHalf(true);

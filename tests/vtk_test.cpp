@@ -106,7 +106,7 @@ TEST(VtkReader, SurvivesEveryFlippedBit) {
 TEST(VtkReader, RefusesMoreArraysThanAnybodyLooksThrough) {
   std::string arrays = "POINTS 0 float\nPOINT_DATA 0\nFIELD f 5000\n";
   for (int k = 0; k < 5000; ++k) arrays += fmt::format("a{} 1 0 char\n", k);
-  expectFileRefused(vtk("ASCII", arrays), {"channels", "at most 4096"});
+  expectFileRefused(vtk("ASCII", arrays), {"channels", "at most 1024"});
 }
 
 TEST(VtkReader, SaysWhatIsWrong) {

@@ -14,7 +14,7 @@ namespace {
 
 constexpr char kMagic[] = {'B', 'g', 'e', 'o', 'V'};
 constexpr std::int32_t kVersion = 5;
-constexpr std::size_t kMostAttributes = 4096, kMostRowBytes = 1 << 20, kMostTexts = 1 << 20;
+constexpr std::size_t kMostAttributes = kMostChannels, kMostRowBytes = 1 << 20, kMostTexts = 1 << 20;
 constexpr std::size_t kBlockBytes = 1 << 19;
 constexpr std::size_t kPlaceBytes = 16;
 

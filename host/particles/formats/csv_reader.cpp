@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kBlockBytes = 1 << 20;
 /// A line that is longer is none of a table.
 constexpr std::size_t kMostLine = 1 << 16;
-constexpr std::size_t kMostColumns = 1024;
+constexpr std::size_t kMostColumns = kMostChannels;
 
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r";

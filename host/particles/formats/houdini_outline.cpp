@@ -13,7 +13,7 @@
 namespace mote {
 namespace {
 
-constexpr std::size_t kMostAttributes = 4096, kMostNumbers = 1024;
+constexpr std::size_t kMostAttributes = kMostChannels, kMostNumbers = 1024;
 constexpr std::size_t kMostFlags = 1 << 26;     ///< pages of 1024 points, of all attributes
 constexpr std::size_t kMostGlobalNumbers = 64;  ///< kept as metadata
 constexpr std::size_t kMostDepth = 64;          ///< of the lists that are looked into; Houdini needs ten

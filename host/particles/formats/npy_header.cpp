@@ -7,6 +7,8 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <set>
+#include <string_view>
 
 #include "host/core/error.h"
 #include "host/particles/formats/section.h"
@@ -285,6 +287,10 @@ NpyTable npyTable(const std::string& place, const NpyArray& array) {
   NpyTable table{array.shape[0], array.elementBytes, {}, array.bigEndian, false};
   if (array.structured) {
     table.channels = withVectors(array.fields);
+    std::set<std::string_view> names;
+    for (const PlacedChannel& placed : table.channels)
+      if (!names.insert(placed.channel.name).second)
+        throw InputError(place, "descr", "fields of different names", fmt::format("'{}' twice", placed.channel.name));
     return table;
   }
   const std::uint64_t width = numbersOfRow(place, array);

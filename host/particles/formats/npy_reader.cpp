@@ -25,17 +25,13 @@ NpyReader::NpyReader(std::string path) : ParticleFile(path), file_(std::move(pat
   dataBegin_ = array.dataBegin;
   table_ = npyTable(path_, array);
   count_ = table_.count;
-  for (const PlacedChannel& placed : table_.channels) {
-    if (channel(placed.channel.name))
-      throw InputError(path_, "descr", "fields of different names", fmt::format("'{}' twice", placed.channel.name));
-    channels_.push_back(placed.channel);
-  }
   const std::uint64_t left = file_.bytes() - dataBegin_, rowBytes = table_.rowBytes;
   if (count_ > left / rowBytes)
     throw InputError(
         path_, "shape",
         fmt::format("at most {} particles of {} bytes, as {} bytes follow the header", left / rowBytes, rowBytes, left),
         fmt::format("{}", count_), "the file is cut off");
+  for (const PlacedChannel& placed : table_.channels) channels_.push_back(placed.channel);
   if (left > count_ * rowBytes)
     logWarning(fmt::format("{}: ignored {} bytes behind the last of its {} particles", path_, left - count_ * rowBytes,
                            count_));

@@ -173,6 +173,7 @@ void Prt2Reader::readChannels(Chunk& chunk) {
     throw InputError(path_, chunk.what(), fmt::format("at most {} bytes", kMostChannelBytes),
                      fmt::format("{}", chunk.left()));
   const std::uint64_t count = chunk.varint();
+  requireFewChannels(path_, count);
   for (std::uint64_t k = 0; k < count; ++k) {
     const std::string name = chunk.text(), type = chunk.text();
     const std::uint64_t size = chunk.varint();

@@ -29,6 +29,9 @@ constexpr std::int32_t kUpperEdge = 4096;
 constexpr std::int32_t kMostCoordinate = 1 << 30;
 constexpr std::uint32_t kMostText = 1 << 16, kMostAttributes = 1024;
 constexpr std::uint64_t kMostRowBytes = std::uint64_t{1} << 30;
+// Points: bytes of masks that OpenVDB goes through in all its passes, for a byte of the tree. Sixty attributes of points
+// of which each has an upper node to itself come to it.
+constexpr std::uint64_t kMostMaskBytes = 64;
 
 struct TreeType {
   std::string_view name;
@@ -133,6 +136,8 @@ class TreeCheck {
 
   Cursor& cursor() { return cursor_; }
   std::size_t leaves() const { return leaves_; }
+  /// Masks of nodes' children [bytes], all of which are gone through to find the leaves.
+  std::uint64_t childMaskBytes() const { return childMaskBytes_; }
 
   void topology() {
     if (const auto buffers = cursor_.number<std::uint32_t>("number of buffers"); buffers != 1)
@@ -181,6 +186,7 @@ class TreeCheck {
   void node(const Child& child) {
     const Mask<Values> children(cursor_, "a node's children"), active(cursor_, "a node's mask");
     if (children.overlaps(active)) cursor_.fail("a node's masks", "a tile or a child", "both");
+    childMaskBytes_ += sizeof children.words;
     compressedValues(active, true);
     for (std::size_t left = children.count(); left > 0; --left) child();
   }
@@ -241,6 +247,7 @@ class TreeCheck {
   bool half_, points_;
   std::uint32_t compression_;
   std::size_t leaves_ = 0;
+  std::uint64_t childMaskBytes_ = 0;
   std::vector<std::byte> unpacked_;
 };
 
@@ -277,6 +284,10 @@ class PointCheck {
   /// Behind the topology: passes over all leaves.
   void passes() {
     const auto passes = cursor_.number<std::uint16_t>("number of passes");
+    if (passes * nodes_.childMaskBytes() > tree_.bytes.size() * kMostMaskBytes)
+      cursor_.fail("number of passes", fmt::format("few over nodes as empty as these ({} bytes of masks)",
+                                                   nodes_.childMaskBytes()),
+                   fmt::format("{}", passes));
     if (nodes_.leaves() == 0) return;
     if (passes < 4 || passes % 2 != 0 || passes > 4 + 2 * kMostAttributes)
       cursor_.fail("number of passes", fmt::format("4 to {}, even", 4 + 2 * kMostAttributes),
