@@ -132,9 +132,10 @@ void settleDensity(Scene& scene, Frame& frame, FrameStats& stats) {
   if (choice.fraction < 1) scene.lighting.error = 0;  // the sample has spent it: its light is exact
 }
 
-/// True where this frame is one of many: of this run, or of a sequence that other runs do the rest of.
+/// True where this frame is one of many: of the shot, or of a sequence that other runs do the rest of.
 bool isAnimated(const Scene& scene) {
-  if (scene.frames.first != scene.frames.last) return true;
+  const Frames& shot = scene.shot ? *scene.shot : scene.frames;
+  if (shot.first != shot.last || scene.camera.keys.size() > 1) return true;
   return std::any_of(scene.particles.begin(), scene.particles.end(),
                      [](const ParticleSource& source) { return hasFramePattern(source.file); });
 }
@@ -189,7 +190,8 @@ Frame prepareFrame(Scene& scene, int number, FrameStats& stats, FramePurpose pur
   return prepareFrame(scene, loadFrame(scene, number, purpose), stats);
 }
 
-Frame prepareFrame(Scene& scene, FrameFiles files, FrameStats& stats) {
+Frame prepareFrame(Scene& unsettled, FrameFiles files, FrameStats& stats) {
+  Scene scene = unsettled;  // a frame that fails settles nothing
   Frame frame;
   const int number = files.number;
   frame.number = stats.frame = number;
@@ -231,6 +233,7 @@ Frame prepareFrame(Scene& scene, FrameFiles files, FrameStats& stats) {
   stats.radius = radiusRange(frame.particles);
   stats.origin = frame.particles.origin;
   stats.seconds["octree"] = timer.lap();
+  unsettled = std::move(scene);
   return frame;
 }
 

@@ -40,7 +40,7 @@ struct Frame {
 /// and "auto" sub-sampling, and of solids for their tree).
 /// What the scene leaves open (a fitted camera, the default light, a density calibrated by optical depth, the origin)
 /// is settled by the first frame that is prepared and written into `scene`, so that a sequence neither jitters nor
-/// flickers. Throws InputError as readers and loaders do.
+/// flickers. Throws InputError as readers and loaders do; `scene` is then as it was.
 Frame prepareFrame(Scene& scene, int number, FrameStats& stats, FramePurpose purpose = FramePurpose::Picture);
 /// … of files that are loaded.
 Frame prepareFrame(Scene& scene, FrameFiles files, FrameStats& stats);

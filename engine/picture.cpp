@@ -12,13 +12,6 @@ namespace {
 
 constexpr std::size_t kBlock = 1 << 12;
 
-SplatLayers layersOf(const Frame& frame, const Output& output) {
-  return {.depth = output.depth,
-          .opticalDepth = output.opticalDepth,
-          .velocity = output.velocity,
-          .colorAlpha = !frame.extinction.grey()};
-}
-
 /// What surfaces look like: of all lights, or of one.
 using SurfaceRadiance = std::vector<vec3>;
 
@@ -106,6 +99,14 @@ ImageLayer shadowLayer(const std::string& light, const Surfaces& surfaces, const
 
 }  // namespace
 
+SplatLayers pictureLayers(const Frame& frame, const Scene& scene) {
+  const Output& output = scene.output;
+  return {.depth = output.depth,
+          .opticalDepth = output.opticalDepth,
+          .velocity = output.velocity,
+          .colorAlpha = !frame.extinction.grey()};
+}
+
 Image makePicture(const Frame& frame, const Scene& scene, LitParticles lit, const Surfaces& surfaces,
                   std::vector<SurfaceLight> surfaceLights, Rasterizer& rasterizer, FrameStats& stats) {
   std::vector<ImageLayer> shadows;
@@ -122,7 +123,7 @@ Image makePicture(const Frame& frame, const Scene& scene, LitParticles lit, cons
   }
   surfaceLights.clear();
   Composer composer(scene, surfaces, rasterizer, stats);
-  Image picture = composer.compose(total, layersOf(frame, scene.output));
+  Image picture = composer.compose(total, pictureLayers(frame, scene));
   picture.layers = std::move(shadows);
   if (!scene.output.lights) return picture;
   const SplatLayers plain{.colorAlpha = !frame.extinction.grey() && !surfaces.empty()};

@@ -11,6 +11,9 @@
 
 namespace mote {
 
+/// What the scene wants beside radiance and A.
+SplatLayers pictureLayers(const Frame& frame, const Scene& scene);
+
 /// Draws the medium before, beside and between the surfaces, and lays both over each other, each with its share of the
 /// pixel:
 ///   radiance Σ coverage · (medium before the surface + (1 − its α) · surface);   α likewise, holdouts counting as 0

@@ -22,6 +22,12 @@ Backends chooseBackends(Backend lighting, Backend raster, const DeviceOptions& o
 /// What draw() needs of the light beside its sum.
 LightWanted lightWanted(const Scene& scene);
 
+struct DrawingSample {
+  double seconds = 0;      ///< of the whole
+  std::size_t inView = 0;  ///< particles
+  Image picture;           ///< of some of them, without light
+};
+
 class Renderer {
  public:
   /// `gpu` may be null where `backends` names no device; it must outlive the renderer.
@@ -36,6 +42,11 @@ class Renderer {
   /// lightWanted(scene) asks. `order`, if given, gets the sorted slots.
   Image draw(const Frame& frame, const Scene& scene, LitParticles lit, FrameStats& stats,
              std::vector<layout::uint>* order = nullptr);
+
+  /// About what light() would take [s], from a sample of the receivers; lighting within an error is done as a whole.
+  double lightingSeconds(const Frame& frame);
+  /// About what draw() would take without solids, from samples of the particles in view.
+  DrawingSample drawingSample(const Frame& frame, const Scene& scene);
 
  private:
   Backends backends_;

@@ -50,6 +50,7 @@ struct RunStats {
   std::string device = "none";   ///< Vulkan device in use
   std::string lighting, raster;  ///< "cpu" or "gpu"
   unsigned threads = 0;
+  std::optional<int> settledBy;    ///< the frame that settled what the scene leaves open; none: nothing was
   std::string settings;            ///< SHA-256 of everything but the input files that a picture may depend on
   std::vector<FrameStats> frames;  ///< that were written
   std::vector<FailedFrame> failed;

@@ -13,7 +13,9 @@
 #include "host/image/exr.h"
 #include "host/particles/formats/particle_file.h"
 #include "host/scene/missing_file.h"
+#include "host/scene/scene_reader.h"
 #include "tools/command.h"
+#include "tools/preflight.h"
 
 namespace mote {
 namespace {
@@ -46,24 +48,27 @@ Kind kindOf(const std::string& path) {
                    "none of these", "of a scene's other inputs mote info says nothing");
 }
 
-void describe(const std::string& path, bool json) {
+void describe(const std::string& path, bool json, const CommonOptions& common) {
   const Kind kind = kindOf(path);
   const Json found = kind == Kind::Particles ? describeParticles(path)
                      : kind == Kind::Picture ? describePicture(path)
-                                             : describeScene(path);
+                                             : preflight(readScene(path), common);
   if (json)  // one line a file: what jq and every line-wise reader takes
     fmt::print("{}\n", found.dump(-1, ' ', false, Json::error_handler_t::replace));
   else
-    kind == Kind::Particles ? printParticles(found) : kind == Kind::Picture ? printPicture(found) : printScene(found);
+    kind == Kind::Particles ? printParticles(found) : kind == Kind::Picture ? printPicture(found) : printPreflight(found);
+  if (kind != Kind::Scene) return;
+  std::fflush(stdout);
+  requireNothingMissing(found);
 }
 
 /// All files, though some may be wrong: who has a hundred frames wants to know which.
-void info(const std::vector<std::string>& files, bool json) {
-  if (files.size() == 1) return describe(files[0], json);
+void info(const std::vector<std::string>& files, bool json, const CommonOptions& common) {
+  if (files.size() == 1) return describe(files[0], json, common);
   std::size_t wrong = 0;
   for (const std::string& path : files) {
     try {
-      describe(path, json);
+      describe(path, json, common);
     } catch (const InputError& error) {
       ++wrong;
       std::fflush(stdout);
@@ -109,7 +114,7 @@ std::string bytesText(double bytes) {
   return fmt::format("{:.2f} GB", bytes / 1e9);
 }
 
-void addInfoCommand(CLI::App& app, const CommonOptions&, int&) {
+void addInfoCommand(CLI::App& app, const CommonOptions& common, int&) {
   struct InfoOptions {
     std::vector<std::string> files;
     bool json = false;
@@ -120,7 +125,7 @@ void addInfoCommand(CLI::App& app, const CommonOptions&, int&) {
       ->required()
       ->type_name("FILE");
   command->add_flag("--json", options->json, "Print one JSON object a file, each on a line of its own");
-  command->callback([options] { info(options->files, options->json); });
+  command->callback([options, &common] { info(options->files, options->json, common); });
 }
 
 }  // namespace mote

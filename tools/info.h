@@ -3,6 +3,8 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "host/scene/scene.h"
+
 namespace mote {
 
 /// A particle file of any format: count, channels with the least, mean and greatest of their finite numbers and the one
@@ -15,9 +17,9 @@ void printParticles(const nlohmann::ordered_json& info);
 nlohmann::ordered_json describePicture(const std::string& path);
 void printPicture(const nlohmann::ordered_json& info);
 
-/// A scene and what its first frame will take; of particle files only the headers are read. Throws InputError where the
-/// scene or one of these files is wrong.
-nlohmann::ordered_json describeScene(const std::string& path);
+/// A scene and the memory that its frame takes; of particle files only the headers are read. Throws InputError where one
+/// of them is wrong.
+nlohmann::ordered_json describeScene(const Scene& scene, int frame);
 void printScene(const nlohmann::ordered_json& info);
 
 /// Decimal units: "950 B", "27.4 MB".

@@ -1,170 +1,20 @@
-// The scenes' part of `mote info`: what they hold, and an estimate of what their first frame takes.
+// What a scene holds, as far as it and the headers of its files tell.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "host/core/error.h"
 #include "host/core/parallel.h"
-#include "host/octree/octree.h"
-#include "host/particles/our_channels.h"
 #include "host/scene/camera_path.h"
 #include "host/scene/frame_path.h"
-#include "host/scene/missing_file.h"
-#include "host/scene/scene_reader.h"
-#include "host/solids/surfaces.h"
-#include "shaders/glsl/layout/node.h"
-#include "shaders/glsl/layout/sort.h"
-#include "shaders/glsl/layout/splat.h"
 #include "tools/info.h"
+#include "tools/scene_facts.h"
 
 namespace mote {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-/// One source as far as its header or the scene tells.
-struct SourceFacts {
-  std::uint64_t count = 0;
-  std::string from, radius;
-  bool color = false, absorption = false, emission = false, velocity = false, id = false;
-};
-
-const char* nameOf(Generator generator) {
-  switch (generator) {
-    case Generator::Ball: return "ball";
-    case Generator::Cloud: return "cloud";
-    case Generator::Plume: return "plume";
-    case Generator::None: break;
-  }
-  return "none";
-}
-
-std::string radiusText(const ParticleSource& source, bool hasChannel) {
-  const RadiusRule& rule = source.radius;
-  if (rule.kind == RadiusRule::Kind::Number) return fmt::format("{:g}", rule.value);
-  if (rule.kind == RadiusRule::Kind::Channel) return fmt::format("channel {} × {:g}", rule.channel, rule.scale);
-  return hasChannel ? "channel Radius" : "auto: 1.5 × the mean distance to the nearest 8";
-}
-
-SourceFacts fileFacts(const ParticleSource& source, int frame) {
-  const std::string path = framePath(source.file, frame);
-  std::error_code ignored;
-  if (!std::filesystem::exists(path, ignored))
-    throw InputError(path, "", "a particle file", "no such file", nearestNames(source.file, path));
-  const std::unique_ptr<ParticleFile> file = openParticleFile(path, samplingOf(source));
-  const auto has = [&](const std::string& ours) {
-    return file->channel(nameInFile(source, *file, ours).theirs) != nullptr;
-  };
-  return {.count = file->count(),
-          .from = path,
-          .radius = radiusText(source, has("Radius")),
-          .color = has("Color"),
-          .absorption = has("Absorption"),
-          .emission = has("Emission"),
-          .velocity = has("Velocity"),
-          .id = has("ID")};
-}
-
-SourceFacts factsOf(const ParticleSource& source, int frame) {
-  if (!source.file.empty()) return fileFacts(source, frame);
-  return {.count = source.count,
-          .from = nameOf(source.generate),
-          .radius = radiusText(source, true),
-          .velocity = source.generate == Generator::Plume,
-          .id = true};
-}
-
-/// Bytes that one frame holds at its peak: what grows with the particles or the picture, and the program itself. A test
-/// holds the host's against renders.
-struct MemoryNeed {
-  double host = 0, device = 0;
-};
-
-/// What of a scene decides about its memory.
-struct MemoryFacts {
-  double particles, pixels, lights;
-  double share;      ///< of the particles in the octree; "auto" may take all
-  double cellNodes;  ///< bytes of nodes a particle in the tree
-  bool color, absorption, emission, velocity, id;
-  bool moving;       ///< velocities are drawn
-  bool curved;       ///< paths in the shutter beside them
-  bool rgb, solids;  ///< extinction that is not grey; solids that are seen
-  bool ahead;        ///< the next frame's particles load meanwhile
-
-  MemoryFacts(double count, const std::vector<SourceFacts>& sources, const Scene& scene) {
-    const auto any = [&](bool SourceFacts::*has) {
-      return std::any_of(sources.begin(), sources.end(), [&](const SourceFacts& s) { return s.*has; });
-    };
-    particles = count;
-    pixels = double(scene.output.size.x) * scene.output.size.y;
-    lights = scene.defaultLights ? 1 : static_cast<double>(scene.lights.size());
-    share = scene.lighting.autoSubsample ? 1 : scene.lighting.subsample;
-    // Particles a cell × nodes a particle: between 2 and 7, by how the particles fall into the cells; measured for the
-    // three generators, 10⁴ to 10⁶ particles, 8 to 128 a cell.
-    const double perCell =
-        scene.lighting.particlesPerCell > 0 ? scene.lighting.particlesPerCell : kDefaultParticlesPerCell;
-    cellNodes = std::min(2.0, 4 / perCell) * sizeof(layout::Node);
-    color = any(&SourceFacts::color), absorption = any(&SourceFacts::absorption);
-    emission = any(&SourceFacts::emission), velocity = any(&SourceFacts::velocity), id = any(&SourceFacts::id);
-    moving = velocity && (scene.output.velocity || scene.camera.shutter.x != scene.camera.shutter.y);
-    curved = scene.camera.shutter.x != scene.camera.shutter.y &&
-             std::any_of(scene.particles.begin(), scene.particles.end(),
-                         [](const ParticleSource& source) { return source.interpolate == Interpolation::Hermite; });
-    const vec3& e = scene.medium.extinction;
-    rgb = absorption || e.x != e.y || e.y != e.z;
-    ahead = scene.frames.first + scene.frames.step <= scene.frames.last && threadCount() > 1;
-    solids = std::any_of(scene.solids.begin(), scene.solids.end(),
-                         [](const Solid& solid) { return solid.mode != SolidMode::Hidden; });
-  }
-  /// Receivers of their own beside those in the tree.
-  bool sampled() const { return share < 1; }
-  /// The splat of a particle with what full splats have: colours, emission, velocity.
-  double splat() const { return sizeof(layout::SplatParticle) + 12.0 * (rgb + emission + moving); }
-};
-
-/// Bytes a particle on the host while the picture is drawn, which is when most is held.
-double particleBytes(const MemoryFacts& f, const Output& output) {
-  const double loaded =
-      12 + 4 + 4 + 12.0 * (f.color + f.absorption + f.emission + f.velocity) + 8.0 * f.id + 24.0 * f.curved;
-  const double set = loaded * (f.ahead ? 2 : 1) + 4;  // and the optical depth through each
-  const double tree = f.share * (6 * 4 + 8 * f.absorption + f.cellNodes) + (f.sampled() ? 5 * 4 : 0);
-  const double sort = 8 + 4;                                                                 // (key, index) and order
-  const double splats = f.splat() + 12.0 * f.absorption;                                     // and factors of colours
-  const double byLight = output.lights ? 12 * f.lights + sizeof(layout::SplatParticle) : 0;  // and one light's splats
-  return set + tree + sort + splats + byLight;
-}
-
-/// Bytes a pixel of one drawing.
-double drawnBytes(const MemoryFacts& f, const Output& output) {
-  return 16 + 4.0 * output.depth + 4.0 * output.opticalDepth + 8.0 * output.velocity + 12.0 * f.rgb;
-}
-
-/// Bytes a pixel on the host, as if surfaces were all over the picture: while it is drawn, or while they are gathered.
-double pixelBytes(const MemoryFacts& f, const Output& output) {
-  const double lightLayers = output.lights ? f.lights + f.emission : 0;
-  const double layers = 4 * (output.shadow ? f.lights : 0) + 12 * lightLayers;
-  const double one = lightLayers > 0 ? 16 + 12.0 * (f.rgb && f.solids) : 0;  // the picture by one light
-  const double drawn = drawnBytes(f, output) + layers + one;
-  if (!f.solids) return drawn + (output.precision == Precision::Half ? 2 * (4 + 3.0 * f.rgb + 3 * lightLayers) : 0);
-  const double surfaces = sizeof(Surface) + 4 + 12 + 16 * f.lights;  // and where a pixel's begin, and their light
-  // Two drawings at once, and four depths for the rasteriser; what is written as half comes when all that is gone.
-  return std::max(2.0 * sizeof(Surface) + 4, drawn + drawnBytes(f, output) + one + 4 * 4 + surfaces);
-}
-
-MemoryNeed memoryNeed(const MemoryFacts& f, const Scene& scene) {
-  constexpr double kProgram = 50e6;  // code, libraries (30 MB are OpenVDB's tables), threads
-  const double channels = f.absorption ? 3 : 1;
-  const double lighting = f.share * (f.cellNodes + 16 + 4 * channels) + 4 + 4 * channels +  // tree, order, result
-                          (f.sampled() ? 16 + 4 : 0);
-  const double drawing = f.splat() + sizeof(layout::SortPair) + 4;
-  const bool layers = scene.output.depth || scene.output.opticalDepth || scene.output.velocity || f.rgb;
-  return {.host = kProgram + f.particles * particleBytes(f, scene.output) + f.pixels * pixelBytes(f, scene.output),
-          .device = std::max(f.particles * lighting,
-                             f.particles * drawing + f.pixels * ((layers ? 40 : 16) + 4.0 * f.solids))};
-}
 
 /// What takes memory and stands in no header.
 Json notCounted(const Scene& scene) {
@@ -177,10 +27,6 @@ Json notCounted(const Scene& scene) {
   list.push_back("a Vulkan driver's own");
   return list;
 }
-
-/// 0.25 µs a ray on two cores for a million particles (host/lighting/lighting.h); a ray meets the more, the more there
-/// are beside each other: N^(1/3) (DESIGN §5).
-double raySeconds(double particles) { return 5e-7 * std::cbrt(particles / 1e6) / threadCount(); }
 
 const char* nameOf(LightType type) {
   switch (type) {
@@ -286,24 +132,19 @@ std::string approximationsText(const Json& lighting) {
 
 }  // namespace
 
-Json describeScene(const std::string& path) {
-  const Scene scene = readScene(path);
-  std::vector<SourceFacts> facts;
+Json describeScene(const Scene& scene, int frame) {
+  const std::vector<SourceFacts> facts = factsOf(scene, frame);
   Json sources = Json::array();
-  std::uint64_t particles = 0;
-  for (const ParticleSource& source : scene.particles) {
-    facts.push_back(factsOf(source, scene.frames.first));
-    particles += facts.back().count;
-    sources.push_back({{source.file.empty() ? "generate" : "file", facts.back().from},
-                       {"count", facts.back().count},
-                       {"radius", facts.back().radius}});
-  }
+  for (std::size_t k = 0; k < facts.size(); ++k)
+    sources.push_back({{scene.particles[k].file.empty() ? "generate" : "file", facts[k].from},
+                       {"count", facts[k].count},
+                       {"radius", facts[k].radius}});
   const Json lights = lightsJson(scene);
   const auto shadows =
       std::count_if(lights.begin(), lights.end(), [](const Json& l) { return l["casts_shadows"] == true; });
-  const double count = static_cast<double>(particles), rays = count * static_cast<double>(shadows);
-  const MemoryNeed need = memoryNeed(MemoryFacts(count, facts, scene), scene);
-  return {{"file", path},
+  const std::uint64_t particles = particlesOf(facts);
+  const MemoryNeed need = memoryNeed(scene, facts, loadsAhead(scene));
+  return {{"file", scene.path},
           {"kind", "scene"},
           {"particles", particles},
           {"sources", sources},
@@ -318,9 +159,8 @@ Json describeScene(const std::string& path) {
            {{"host_bytes", std::round(need.host)},
             {"device_bytes", std::round(need.device)},
             {"not_counted", notCounted(scene)},
-            {"rays", rays},
-            {"threads", threadCount()},
-            {"lighting_seconds", rays * raySeconds(count)}}}};
+            {"rays", static_cast<double>(particles) * static_cast<double>(shadows)},
+            {"threads", threadCount()}}}};
 }
 
 void printScene(const Json& info) {
@@ -347,8 +187,6 @@ void printScene(const Json& info) {
       fmt::format("about {}; on a Vulkan device about {}; without {}", bytesText(estimate["host_bytes"].get<double>()),
                   bytesText(estimate["device_bytes"].get<double>()),
                   fmt::join(estimate["not_counted"].get<std::vector<std::string>>(), ", ")));
-  row("work", fmt::format("{:.0f} rays a frame, about {:.2g} s with {} threads", estimate["rays"].get<double>(),
-                          estimate["lighting_seconds"].get<double>(), estimate["threads"].get<unsigned>()));
 }
 
 }  // namespace mote

@@ -1,6 +1,7 @@
 // mote light: every particle with the light that reaches it, as a particle file that anybody can check.
 #include <CLI/CLI.hpp>
 
+#include "engine/settling.h"
 #include "host/core/log.h"
 #include "host/core/output_file.h"
 #include "host/core/parallel.h"
@@ -64,6 +65,7 @@ void light(const LightOptions& options, const CommonOptions& common) {
                                            Backend::Cpu, deviceOptions(common), gpu);
   Renderer renderer(backends, gpu.get());
   FrameStats stats;
+  settleByShot(scene, number);
   const Frame frame = prepareFrame(scene, number, stats, FramePurpose::Light);
   const LitParticles lit = renderer.light(frame, {.transmittance = true}, stats);
   requireNoValidationMessages(gpu.get());

@@ -7,7 +7,9 @@
 #include <filesystem>
 #include <map>
 #include <new>
+#include <nlohmann/json.hpp>
 
+#include "engine/settling.h"
 #include "host/core/error.h"
 #include "host/core/log.h"
 #include "host/core/output_file.h"
@@ -16,6 +18,7 @@
 #include "host/image/png.h"
 #include "host/scene/frame_path.h"
 #include "host/scene/sequence.h"
+#include "tools/preflight.h"
 #include "tools/resume.h"
 
 namespace mote {
@@ -24,7 +27,7 @@ namespace {
 struct RenderOptions {
   SceneOptions scene;
   std::string output, frames, size, lighting, raster, preview, exposure = "auto", stats;
-  bool stopOnError = false, resume = false;
+  bool stopOnError = false, resume = false, dryRun = false, json = false;
 };
 
 /// Everything that flags change, in the scene itself.
@@ -70,28 +73,6 @@ std::string stageSeconds(const FrameStats& stats) {
   return text;
 }
 
-/// Draws frame `number`; `next` begins to load as soon as the scene is `settled`.
-void renderFrame(Scene& scene, int number, std::optional<int> next, const RenderOptions& options, FrameLoader& loader,
-                 Renderer& renderer, RunStats& run, bool& settled) {
-  FrameStats stats;
-  Timer total;
-  const std::string path = framePath(scene.output.file, number);
-  const Frame frame = prepareFrame(scene, loader.take(number), stats);
-  settled = true;
-  if (next) loader.prefetch(*next);
-  const Image image = renderer.draw(frame, scene, renderer.light(frame, lightWanted(scene), stats), stats);
-  Timer write;
-  stats.warnings = takeWarnings();
-  writeFrameExr(path, image, frame, scene, run, stats);
-  if (!options.preview.empty())
-    writePng(framePath(options.preview, number), image, parseExposure(options.exposure).value_or(autoExposure(image)));
-  stats.seconds["write"] = write.seconds();
-  stats.seconds["total"] = total.seconds();
-  logInfo(fmt::format("frame {}: {} particles, {} lights, {:.1f} s ({}) -> {}", number, stats.particles, stats.lights,
-                      stats.seconds["total"], stageSeconds(stats), path));
-  run.frames.push_back(std::move(stats));
-}
-
 /// What became of a run's frames, "1-4" a line where neighbours fared alike.
 std::string frameTable(const RunStats& run, int step) {
   struct Row {
@@ -118,21 +99,6 @@ std::string frameTable(const RunStats& run, int step) {
   return text;
 }
 
-/// The frames that are to be drawn; with --resume the others are noted as skipped.
-std::vector<int> framesToDraw(const Scene& scene, const RenderOptions& options, RunStats& run) {
-  std::vector<int> frames;
-  for (int number = scene.frames.first; number <= scene.frames.last; number += scene.frames.step) {
-    const bool there = options.resume &&
-                       isRendered(framePath(scene.output.file, number), scene, number, run.settings) &&
-                       (options.preview.empty() || std::filesystem::exists(framePath(options.preview, number)));
-    (there ? run.skipped : frames).push_back(number);
-  }
-  if (options.resume)
-    logInfo(fmt::format("resume: {} of {} frames are there already", run.skipped.size(),
-                        run.skipped.size() + frames.size()));
-  return frames;
-}
-
 /// Frames in their order; one that fails is noted, and the others go on.
 class Batch {
  public:
@@ -141,13 +107,10 @@ class Batch {
 
   /// 0, or the exit code of the worst.
   int render() {
-    const std::vector<int> frames = framesToDraw(scene_, options_, run_);
+    const std::vector<int> frames = framesToDraw();
     goOn_ = frames.size() + run_.skipped.size() > 1 && !options_.stopOnError;
-    auto skipped = run_.skipped.begin();
-    for (std::size_t k = 0; k < frames.size(); ++k) {
-      for (; skipped != run_.skipped.end() && *skipped < frames[k]; ++skipped) settleBy(*skipped);
+    for (std::size_t k = 0; k < frames.size(); ++k)
       draw(frames[k], k + 1 < frames.size() ? std::optional(frames[k + 1]) : std::nullopt);
-    }
     if (!run_.failed.empty())
       fmt::print(stderr, "mote: {} of {} frames failed:{}\n", run_.failed.size(),
                  run_.failed.size() + run_.frames.size() + run_.skipped.size(), frameTable(run_, scene_.frames.step));
@@ -155,17 +118,24 @@ class Batch {
   }
 
  private:
-  /// What the scene leaves open is as in the run that is resumed.
-  void settleBy(int number) {
-    if (settled_) return;
-    try {
-      FrameStats ignored;
-      prepareFrame(scene_, number, ignored);
-      settled_ = true;
-    } catch (const std::exception&) {
-      // Its picture is there, and what is wrong with it now was not then.
+  /// With --resume, those whose pictures are there are noted as skipped.
+  std::vector<int> framesToDraw() {
+    std::vector<int> frames;
+    if (options_.resume) settle({});
+    for (int number = scene_.frames.first; number <= scene_.frames.last; number += scene_.frames.step) {
+      const bool there = options_.resume && isRendered(framePath(scene_.output.file, number), scene_, number, run_) &&
+                         (options_.preview.empty() || std::filesystem::exists(framePath(options_.preview, number)));
+      (there ? run_.skipped : frames).push_back(number);
     }
-    takeWarnings();
+    if (options_.resume)
+      logInfo(fmt::format("resume: {} of {} frames are there already", run_.skipped.size(),
+                          run_.skipped.size() + frames.size()));
+    return frames;
+  }
+  /// Whatever part of the shot this run draws, what the scene leaves open is as it is for all of it.
+  void settle(std::optional<int> before) {
+    run_.settledBy = settleByShot(scene_, before);
+    settled_ = run_.settledBy.has_value();
   }
   void draw(int number, std::optional<int> next) {
     const auto fail = [&](int code, const std::string& error) {
@@ -176,7 +146,7 @@ class Batch {
       exitCode_ = std::max(exitCode_, code);
     };
     try {
-      renderFrame(scene_, number, next, options_, loader_, renderer_, run_, settled_);
+      drawFrame(number, next);
     } catch (const InputError& error) {
       fail(kBadInput, error.what());
     } catch (const MachineError& error) {
@@ -185,31 +155,71 @@ class Batch {
       fail(kMachine, "memory ran out");
     }
   }
+  /// The frame's files; where they are far from 0 and the scene gives no origin, measured from that of the shot.
+  FrameFiles files(int number) {
+    if (!settled_) settle(number);
+    FrameFiles here = loader_.take(number);
+    const Frames& shot = scene_.shot ? *scene_.shot : scene_.frames;
+    if (settled_ || scene_.origin || here.particles.origin == dvec3(0) || number == shot.first) return here;
+    scene_.origin = loadFrame(scene_, shot.first, FramePurpose::Light).particles.origin;
+    return loadFrame(scene_, number, FramePurpose::Picture);
+  }
+  /// `next` begins to load as soon as the scene is settled.
+  void drawFrame(int number, std::optional<int> next) {
+    FrameStats stats;
+    Timer total;
+    const std::string path = framePath(scene_.output.file, number);
+    FrameFiles loaded = files(number);
+    const bool open = leavesOpen(scene_);
+    const Frame frame = prepareFrame(scene_, std::move(loaded), stats);
+    if (open) run_.settledBy = number;
+    settled_ = true;
+    if (next) loader_.prefetch(*next);
+    const Image image = renderer_.draw(frame, scene_, renderer_.light(frame, lightWanted(scene_), stats), stats);
+    Timer write;
+    stats.warnings = takeWarnings();
+    writeFrameExr(path, image, frame, scene_, run_, stats);
+    if (!options_.preview.empty())
+      writePng(framePath(options_.preview, number), image,
+               parseExposure(options_.exposure).value_or(autoExposure(image)));
+    stats.seconds["write"] = write.seconds();
+    stats.seconds["total"] = total.seconds();
+    logInfo(fmt::format("frame {}: {} particles, {} lights, {:.1f} s ({}) -> {}", number, stats.particles,
+                        stats.lights, stats.seconds["total"], stageSeconds(stats), path));
+    run_.frames.push_back(std::move(stats));
+  }
 
   Scene& scene_;
   const RenderOptions& options_;
   Renderer& renderer_;
   RunStats& run_;
   FrameLoader loader_;
-  bool goOn_ = false, settled_ = false;
+  bool goOn_ = false;
+  bool settled_ = false;  ///< by a frame of the shot, one of this run or before it
   int exitCode_ = 0;
 };
+
+void dryRun(const Scene& scene, const RenderOptions& options, const CommonOptions& common) {
+  const nlohmann::ordered_json found = preflight(scene, common);
+  if (options.json)
+    fmt::print("{}\n", found.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  else
+    printPreflight(found);
+  std::fflush(stdout);
+  requireNothingMissing(found);
+}
 
 int render(const RenderOptions& options, const CommonOptions& common) {
   Scene scene = openScene(options.scene);
   applyFlags(options, scene);
   parseExposure(options.exposure);
   checkOutputs(options, scene);
+  if (options.dryRun) return dryRun(scene, options, common), 0;
   checkSequences(scene);
 
   std::unique_ptr<Gpu> gpu;
   const Backends backends = chooseBackends(scene.lighting.backend, scene.view.backend, deviceOptions(common), gpu);
-  RunStats run;
-  run.device = gpu ? gpu->device().name() : "none";
-  run.lighting = backends.gpuLighting ? "gpu" : "cpu";
-  run.raster = backends.gpuRaster ? "gpu" : "cpu";
-  run.threads = threadCount();
-  run.settings = settingsOf(scene, run);
+  RunStats run = runOf(scene, backends, gpu.get());
   Renderer renderer(backends, gpu.get());
   const int exitCode = Batch(scene, options, renderer, run).render();
   requireNoValidationMessages(gpu.get());
@@ -218,6 +228,16 @@ int render(const RenderOptions& options, const CommonOptions& common) {
 }
 
 }  // namespace
+
+RunStats runOf(const Scene& scene, const Backends& backends, const Gpu* gpu) {
+  RunStats run;
+  run.device = gpu ? gpu->device().name() : "none";
+  run.lighting = backends.gpuLighting ? "gpu" : "cpu";
+  run.raster = backends.gpuRaster ? "gpu" : "cpu";
+  run.threads = threadCount();
+  run.settings = settingsOf(scene, run);
+  return run;
+}
 
 void addRenderCommand(CLI::App& app, const CommonOptions& common, int& exitCode) {
   auto options = std::make_shared<RenderOptions>();
@@ -234,6 +254,9 @@ void addRenderCommand(CLI::App& app, const CommonOptions& common, int& exitCode)
   command->add_option("--stats", options->stats, "Write counts, seconds and memory as JSON")->type_name("OUT.json");
   command->add_flag("--resume", options->resume,
                     "Leave out frames whose picture is whole and was made from the same files and settings");
+  CLI::Option* dryRun = command->add_flag(
+      "--dry-run", options->dryRun, "Say what the run will take, what is missing and what looks wrong; write nothing");
+  command->add_flag("--json", options->json, "With --dry-run: as one JSON object")->needs(dryRun);
   command->add_flag("--stop-on-error", options->stopOnError,
                     "End with the first frame that fails, instead of going on with the others");
   command->callback([options, &common, &exitCode] { exitCode = render(*options, common); });

@@ -32,6 +32,9 @@ Backend parseBackend(const std::string& flag, const std::string& text, Backend f
 /// The device that the flags ask for; throws InputError for a memory limit that is none.
 DeviceOptions deviceOptions(const CommonOptions& common);
 
+/// What is the same for all frames of a run. `gpu` may be null.
+RunStats runOf(const Scene& scene, const Backends& backends, const Gpu* gpu);
+
 /// Any message of the validation layers makes the run a failure of the machine: throws MachineError with all of them.
 void requireNoValidationMessages(const Gpu* gpu);
 

@@ -16,9 +16,8 @@ namespace mote {
 namespace {
 
 /// Of mote:stats, file by file.
-std::vector<FrameInput> recordedInputs(const std::string& stats) {
+std::vector<FrameInput> recordedInputs(const nlohmann::json& root) {
   std::vector<FrameInput> inputs;
-  const nlohmann::json root = nlohmann::json::parse(stats);
   for (const nlohmann::json& input : root.at("inputs"))
     inputs.push_back({input.at("file").get<std::string>(), input.at("sha256").get<std::string>()});
   return inputs;
@@ -36,20 +35,22 @@ bool hasSources(const std::vector<FrameInput>& inputs, const Scene& scene, int f
 }  // namespace
 
 std::string settingsOf(const Scene& scene, const RunStats& run) {
-  return sha256OfText(fmt::format("{} {} {} {} {}x{} strict {} hold {} from {} {}", MOTE_VERSION, run.device,
+  return sha256OfText(fmt::format("{} {} {} {} {}x{} strict {} hold {} {}", MOTE_VERSION, run.device,
                                   run.lighting, run.raster, scene.output.size.x, scene.output.size.y,
-                                  scene.inputs.strict, scene.inputs.missing == MissingFrames::Hold, scene.frames.first,
-                                  scene.settings));
+                                  scene.inputs.strict, scene.inputs.missing == MissingFrames::Hold, scene.settings));
 }
 
-bool isRendered(const std::string& path, const Scene& scene, int frame, const std::string& settings) {
+bool isRendered(const std::string& path, const Scene& scene, int frame, const RunStats& run) {
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored)) return false;
   try {
     const std::map<std::string, std::string> strings = exrStrings(path);
     const auto made = strings.find("mote:settings"), stats = strings.find("mote:stats");
-    if (made == strings.end() || stats == strings.end() || made->second != settings) return false;
-    const std::vector<FrameInput> inputs = recordedInputs(stats->second);
+    if (made == strings.end() || stats == strings.end() || made->second != run.settings) return false;
+    const nlohmann::json root = nlohmann::json::parse(stats->second);
+    const nlohmann::json& by = root.at("settled_by");
+    if (run.settledBy ? by != *run.settledBy : !by.is_null()) return false;
+    const std::vector<FrameInput> inputs = recordedInputs(root);
     if (!hasSources(inputs, scene, frame)) return false;
     for (const FrameInput& input : inputs)
       if (sha256OfFile(input.file) != input.sha256) return false;

@@ -8,10 +8,11 @@
 namespace mote {
 
 /// SHA-256 of everything but the input files that a picture may depend on: the program's version, the scene with all
-/// flags applied, where it is computed, and the frame that settles what the scene leaves open (the run's first).
+/// flags applied, and where it is computed. Which frames a run draws is no part of it.
 std::string settingsOf(const Scene& scene, const RunStats& run);
 
-/// Whether the picture at `path` is whole, was made with these settings, and from files that have not changed since.
-bool isRendered(const std::string& path, const Scene& scene, int frame, const std::string& settings);
+/// Whether the picture at `path` is whole, was made with the run's settings, what the scene leaves open settled by the
+/// same frame (RunStats::settledBy), and from files that have not changed since.
+bool isRendered(const std::string& path, const Scene& scene, int frame, const RunStats& run);
 
 }  // namespace mote

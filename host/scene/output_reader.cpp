@@ -51,7 +51,8 @@ void readOutput(ObjectReader& root, const std::filesystem::path& folder, Output&
   object.finish();
 }
 
-void readFrames(ObjectReader& root, Frames& frames) {
+void readFrames(ObjectReader& root, Scene& scene) {
+  Frames& frames = scene.frames;
   ObjectReader object = root.object("frames", "the frame range");
   object.integer("first", frames.first, -kMaxFrame, kMaxFrame);
   frames.last = frames.first;
@@ -60,6 +61,7 @@ void readFrames(ObjectReader& root, Frames& frames) {
   object.number("fps", frames.fps, above(0, "frames per second"));
   if (frames.last < frames.first)
     object.problem("last", fmt::format("a last frame >= the first, {}", frames.first), std::to_string(frames.last));
+  if (object.has("first") || object.has("last")) scene.shot = frames;
   object.finish();
 }
 

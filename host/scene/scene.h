@@ -228,7 +228,8 @@ struct Scene {
   Camera camera;
   View view;
   Output output;
-  Frames frames;
+  Frames frames;               ///< to be drawn
+  std::optional<Frames> shot;  ///< the frames that the scene itself names, of which --frames may draw a part or others
   /// What float32 coordinates are measured from; none: what loadParticles finds best.
   std::optional<dvec3> origin;
   dvec3 movedBy{0};  ///< what has been taken off the places of camera and lights (moveOrigin)

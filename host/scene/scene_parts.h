@@ -34,7 +34,8 @@ void readSolids(ObjectReader& root, Scene& scene);
 void readCamera(ObjectReader& root, Camera& camera, bool imported);
 void readView(ObjectReader& root, const std::filesystem::path& folder, View& view);
 void readOutput(ObjectReader& root, const std::filesystem::path& folder, Output& output);
-void readFrames(ObjectReader& root, Frames& frames);
+/// Scene::frames, and Scene::shot where the scene names its frames.
+void readFrames(ObjectReader& root, Scene& scene);
 
 /// The folder that a scene's relative paths start from.
 std::filesystem::path folderOf(const Scene& scene);

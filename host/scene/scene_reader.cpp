@@ -41,7 +41,7 @@ Scene readWhole(ObjectReader& root, const std::string& path) {
   scene.path = path;
   const std::filesystem::path folder = folderOf(scene);
   readFormatVersion(root);
-  readFrames(root, scene.frames);
+  readFrames(root, scene);
   const bool camera = readImport(root, scene);
   readParticles(root, scene);
   readMedium(root, scene.medium);

@@ -1,4 +1,6 @@
-// mote render of several frames where some fail: the others are as if nothing had been.
+// mote render of several frames: where some fail the others are as if nothing had been, and each is what it is alone.
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -125,6 +127,75 @@ TEST_F(MoteRenderBatch, ResumesWhereFramesAreMissingOrNotWhatTheyWere) {
   EXPECT_EQ(resumed({"--size", "32x32"}), (Frames{1, 2, 3, 4}));
   // A preview that is wanted and not there.
   EXPECT_EQ(resumed({"--size", "32x32", "--preview", folder_.file("p.#.png")}), Frames{});
+}
+
+/// Camera, light and density are open: the shot's first frame settles them, whatever part of it a run draws.
+TEST_F(MoteRenderBatch, AFrameAloneIsWhatItIsAmongAll) {
+  writeBytes(damaged_, whole_);
+  writeBytes(folder_.file("scene.json"), R"({"particles": [{"file": "p.#.prt"}], "output": {"size": [48, 32]},
+    "frames": {"first": 1, "last": 4}})");
+  const auto bytes = [&](const std::string& name) { return readBytes(folder_.file(name)); };
+  const auto expectSame = [&](const std::string& frames, std::vector<int> numbers) {
+    EXPECT_EQ(mote({"render", folder_.file("scene.json"), "--lighting", "cpu", "--raster", "cpu", "--frames", frames,
+                    "-o", folder_.file("part.#.exr")},
+                   kWithoutVulkan)
+                  .exitCode,
+              0);
+    for (const int n : numbers)
+      EXPECT_TRUE(bytes(fmt::format("part.{}.exr", n)) == bytes(fmt::format("all.{}.exr", n))) << n << " of " << frames;
+  };
+  ASSERT_EQ(render("all.#.exr").exitCode, 0);
+  expectSame("3", {3});
+  expectSame("2-4x2", {2, 4});
+  const std::string third = bytes("all.3.exr");
+
+  // The first cannot be read: all of them go by the second.
+  const std::string first = readBytes(folder_.file("p.1.prt"));
+  writeBytes(folder_.file("p.1.prt"), first.substr(0, first.size() / 2));
+  ASSERT_EQ(render("all.#.exr").exitCode, 2);
+  EXPECT_FALSE(bytes("all.3.exr") == third);
+  expectSame("3", {3});
+  EXPECT_EQ(Json::parse(readBytes(folder_.file("stats.json")))["settled_by"], 2);
+  // It can be again: what went by the second is not what it would be now.
+  writeBytes(folder_.file("p.1.prt"), first);
+  ASSERT_EQ(render("all.#.exr", {"--resume"}).exitCode, 0);
+  EXPECT_EQ(Json::parse(readBytes(folder_.file("stats.json")))["skipped"], Json::array());
+  EXPECT_TRUE(bytes("all.3.exr") == third);
+}
+
+TEST_F(MoteRenderBatch, FarFromTheOriginTooAFrameAloneIsWhatItIsAmongAll) {
+  // Everything is given but the origin, and the smoke moves: each frame by itself would be measured from elsewhere.
+  writeBytes(damaged_, whole_);
+  writeBytes(folder_.file("scene.json"), R"({"particles": [{"file": "p.#.prt", "translate": [1e6, 0, 0]},
+      {"file": "q.#.csv"}], "output": {"size": [48, 32]},
+    "medium": {"density_scale": 0.001}, "camera": {"position": [1000000, 1, 6], "target": [1000000, 1, 0]},
+    "lights": [{"name": "key", "position": [1000002, 3, 1]}], "frames": {"first": 1, "last": 4}})");
+  for (const int frame : {1, 2, 3, 4})
+    writeBytes(folder_.file(fmt::format("q.{}.csv", frame)),
+               fmt::format("x,y,z,radius,density\n{},0,0,0.1,1\n", 1000000 + 40 * (frame - 1)));
+  ASSERT_EQ(render("all.#.exr").exitCode, 0);
+  ASSERT_EQ(mote({"render", folder_.file("scene.json"), "--lighting", "cpu", "--raster", "cpu", "--frames", "4", "-o",
+                  folder_.file("part.#.exr")},
+                 kWithoutVulkan)
+                .exitCode,
+            0);
+  EXPECT_TRUE(readBytes(folder_.file("part.4.exr")) == readBytes(folder_.file("all.4.exr")));
+}
+
+/// `mote light` too goes by the shot.
+TEST_F(MoteRenderBatch, LightIsThatOfTheShot) {
+  writeBytes(damaged_, whole_);
+  const auto lit = [&](const std::string& frames) {
+    writeBytes(folder_.file("scene.json"), R"({"particles": [{"file": "p.#.prt"}],
+      "lights": [{"name": "key", "position": [2, 3, 1]}], "frames": )" + frames + "}");
+    EXPECT_EQ(mote({"light", folder_.file("scene.json"), "--frame", "3", "-o", folder_.file("lit.prt")}, kWithoutVulkan)
+                  .exitCode,
+              0);
+    return readBytes(folder_.file("lit.prt"));
+  };
+  const std::string ofAll = lit(R"({"first": 1, "last": 4})");
+  EXPECT_FALSE(ofAll == lit(R"({"first": 3, "last": 4})"));
+  EXPECT_TRUE(ofAll == lit(R"({"first": 1, "last": 4, "step": 2})"));
 }
 
 }  // namespace
