@@ -28,6 +28,7 @@ void addCrosscheckCommand(CLI::App& app, const CommonOptions& common, int& exitC
 void addGenerateCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
 void addConvertCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
 void addRepairCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
+void addFarmCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
 void addInfoCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
 void addCompareCommand(CLI::App& app, const CommonOptions& common, int& exitCode);
 void addBenchCommand(CLI::App& app, const CommonOptions& common, int& exitCode);

@@ -48,11 +48,11 @@ Kind kindOf(const std::string& path) {
                    "none of these", "of a scene's other inputs mote info says nothing");
 }
 
-void describe(const std::string& path, bool json, const CommonOptions& common) {
+void describe(const std::string& path, bool json, bool measured, const CommonOptions& common) {
   const Kind kind = kindOf(path);
   const Json found = kind == Kind::Particles ? describeParticles(path)
                      : kind == Kind::Picture ? describePicture(path)
-                                             : preflight(readScene(path), common);
+                                             : preflight(readScene(path), common, measured);
   if (json)  // one line a file: what jq and every line-wise reader takes
     fmt::print("{}\n", found.dump(-1, ' ', false, Json::error_handler_t::replace));
   else
@@ -63,12 +63,12 @@ void describe(const std::string& path, bool json, const CommonOptions& common) {
 }
 
 /// All files, though some may be wrong: who has a hundred frames wants to know which.
-void info(const std::vector<std::string>& files, bool json, const CommonOptions& common) {
-  if (files.size() == 1) return describe(files[0], json, common);
+void info(const std::vector<std::string>& files, bool json, bool measured, const CommonOptions& common) {
+  if (files.size() == 1) return describe(files[0], json, measured, common);
   std::size_t wrong = 0;
   for (const std::string& path : files) {
     try {
-      describe(path, json, common);
+      describe(path, json, measured, common);
     } catch (const InputError& error) {
       ++wrong;
       std::fflush(stdout);
@@ -117,7 +117,7 @@ std::string bytesText(double bytes) {
 void addInfoCommand(CLI::App& app, const CommonOptions& common, int&) {
   struct InfoOptions {
     std::vector<std::string> files;
-    bool json = false;
+    bool json = false, noMeasure = false;
   };
   auto options = std::make_shared<InfoOptions>();
   CLI::App* command = app.add_subcommand("info", "Say what particle files, pictures and scenes hold");
@@ -125,7 +125,10 @@ void addInfoCommand(CLI::App& app, const CommonOptions& common, int&) {
       ->required()
       ->type_name("FILE");
   command->add_flag("--json", options->json, "Print one JSON object a file, each on a line of its own");
-  command->callback([options, &common] { info(options->files, options->json, common); });
+  command->add_flag("--no-measure", options->noMeasure,
+                    "Of scenes only what headers tell: nothing is loaded, no time estimated, nothing looked for that is "
+                    "suspicious");
+  command->callback([options, &common] { info(options->files, options->json, !options->noMeasure, common); });
 }
 
 }  // namespace mote

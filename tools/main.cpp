@@ -45,6 +45,7 @@ void addCommands(CLI::App& app, const CommonOptions& common, int& exitCode) {
   addGenerateCommand(app, common, exitCode);
   addConvertCommand(app, common, exitCode);
   addRepairCommand(app, common, exitCode);
+  addFarmCommand(app, common, exitCode);
   addInfoCommand(app, common, exitCode);
   addCompareCommand(app, common, exitCode);
   addBenchCommand(app, common, exitCode);

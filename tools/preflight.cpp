@@ -164,9 +164,29 @@ Measured measure(Scene scene, int number, const CommonOptions& common, RunStats&
   return found;
 }
 
+/// `frames`: how many such frames the run is worth.
+void addMeasured(const Scene& scene, int number, double frames, const CommonOptions& common, Json& found) {
+  RunStats run;
+  const Measured measured = measure(scene, number, common, run);
+  found["suspicious"] = measured.suspicions;
+  Json& estimate = found["estimate"];
+  estimate["lighting"] = run.lighting, estimate["raster"] = run.raster, estimate["device"] = run.device;
+  estimate["measured_frame"] = number;
+  const auto second = [&](const char* stage) { return measured.seconds.at(stage); };
+  const double work = second("octree") + second("lighting") + second("draw") + second("write");
+  // Loading ahead takes a thread from the others.
+  const double frame = work + second("load") / (loadsAhead(scene) ? threadCount() : 1);
+  const auto rounded = [](double seconds) { return std::round(seconds * 1e4) / 1e4; };
+  Json seconds = Json::object();
+  for (const char* stage : {"load", "octree", "lighting", "draw", "write"}) seconds[stage] = rounded(second(stage));
+  seconds["frame"] = rounded(frame);
+  seconds["all"] = rounded(frame * frames + second("settling") + (loadsAhead(scene) ? second("load") : 0));
+  estimate["seconds"] = std::move(seconds);
+}
+
 }  // namespace
 
-Json preflight(const Scene& scene, const CommonOptions& common) {
+Json preflight(const Scene& scene, const CommonOptions& common, bool measured) {
   const std::vector<std::string> missing = missingFiles(scene);
   if (!missing.empty()) return {{"file", scene.path}, {"kind", "scene"}, {"missing", missing}};
   const std::vector<int> frames = framesOf(scene);
@@ -177,24 +197,9 @@ Json preflight(const Scene& scene, const CommonOptions& common) {
     if (bytes > most) most = bytes, largest = frame;
     all += bytes;
   }
-  RunStats run;
-  const Measured measured = measure(scene, largest, common, run);
   Json found = describeScene(scene, largest);
   found["missing"] = Json::array();
-  found["suspicious"] = measured.suspicions;
-  Json& estimate = found["estimate"];
-  estimate["lighting"] = run.lighting, estimate["raster"] = run.raster, estimate["device"] = run.device;
-  estimate["measured_frame"] = largest;
-  const auto second = [&](const char* stage) { return measured.seconds.at(stage); };
-  const double work = second("octree") + second("lighting") + second("draw") + second("write");
-  // Loading ahead takes a thread from the others.
-  const double frame = work + second("load") / (loadsAhead(scene) ? threadCount() : 1);
-  const auto rounded = [](double seconds) { return std::round(seconds * 1e4) / 1e4; };
-  Json seconds = Json::object();
-  for (const char* stage : {"load", "octree", "lighting", "draw", "write"}) seconds[stage] = rounded(second(stage));
-  seconds["frame"] = rounded(frame);
-  seconds["all"] = rounded(frame * all / most + second("settling") + (loadsAhead(scene) ? second("load") : 0));
-  estimate["seconds"] = std::move(seconds);
+  if (measured) addMeasured(scene, largest, all / most, common, found);
   return found;
 }
 
@@ -206,14 +211,19 @@ void printPreflight(const Json& found) {
     return;
   }
   printScene(found);
-  const Json &estimate = found["estimate"], &seconds = estimate["seconds"];
-  const auto of = [&](const char* stage) { return seconds[stage].get<double>(); };
+  const Json& estimate = found["estimate"];
   const auto& frames = found["frames"];
   const int count =
       (frames["last"].get<int>() - frames["first"].get<int>()) / frames["step"].get<int>() + 1;
+  if (!estimate.contains("seconds")) {
+    row("work", fmt::format("{:.0f} rays a frame, {} threads", estimate["rays"].get<double>(),
+                            estimate["threads"].get<unsigned>()));
+    return;
+  }
   row("work", fmt::format("{:.0f} rays a frame; lighting on the {}, picture on the {}, {} threads",
                           estimate["rays"].get<double>(), estimate["lighting"].get<std::string>(),
                           estimate["raster"].get<std::string>(), estimate["threads"].get<unsigned>()));
+  const auto of = [&](const char* stage) { return estimate["seconds"][stage].get<double>(); };
   row("time", fmt::format("about {:.2g} s for frame {} (load {:.2g}, octree {:.2g}, lighting {:.2g}, draw {:.2g}, "
                           "write {:.2g}), {:.2g} s for {} {}",
                           of("frame"), estimate["measured_frame"].get<int>(), of("load"), of("octree"), of("lighting"),

@@ -18,38 +18,20 @@
 #include "host/image/png.h"
 #include "host/scene/frame_path.h"
 #include "host/scene/sequence.h"
+#include "tools/info.h"
 #include "tools/preflight.h"
 #include "tools/resume.h"
+#include "tools/scene_facts.h"
+#include "tools/shot_options.h"
 
 namespace mote {
 namespace {
 
 struct RenderOptions {
-  SceneOptions scene;
-  std::string output, frames, size, lighting, raster, preview, exposure = "auto", stats;
+  ShotOptions shot;
+  std::string preview, exposure = "auto", stats, memoryLimit;
   bool stopOnError = false, resume = false, dryRun = false, json = false;
 };
-
-/// Everything that flags change, in the scene itself.
-void applyFlags(const RenderOptions& options, Scene& scene) {
-  if (!options.output.empty()) scene.output.file = options.output;
-  if (!options.size.empty()) scene.output.size = parseSize(options.size);
-  if (!options.frames.empty()) {
-    const FrameRange range = parseFrameRange(options.frames);
-    scene.frames.first = range.first, scene.frames.last = range.last, scene.frames.step = range.step;
-  }
-  scene.lighting.backend = parseBackend("--lighting", options.lighting, scene.lighting.backend);
-  scene.view.backend = parseBackend("--raster", options.raster, scene.view.backend);
-}
-
-std::optional<float> parseExposure(const std::string& text) {
-  if (text == "auto") return std::nullopt;
-  char* end = nullptr;
-  const float value = std::strtof(text.c_str(), &end);
-  if (text.empty() || *end != '\0' || !(std::abs(value) <= 100))
-    throw InputError("--exposure", "", "a number of stops from -100 to 100, or auto", "\"" + text + "\"");
-  return value;
-}
 
 /// Every place that will be written is tried before any work: an artist must not learn of a typo after an hour.
 void checkOutputs(const RenderOptions& options, const Scene& scene) {
@@ -99,11 +81,42 @@ std::string frameTable(const RunStats& run, int step) {
   return text;
 }
 
+/// Whether the next frame may load while one is drawn, so that the run stays within `limit` [bytes]. Throws MachineError
+/// where it cannot: before any work, by what the files' headers say. `device`, a device whose memory is the host's.
+bool mayLoadAhead(const Scene& scene, std::uint64_t limit, bool device) {
+  struct Worst {
+    int frame = 0;
+    std::uint64_t particles = 0;
+    double ahead = 0, alone = 0;
+  } worst;
+  for (int number = scene.frames.first; number <= scene.frames.last; number += scene.frames.step) {
+    const std::vector<SourceFacts> facts = factsOf(scene, number);
+    const auto need = [&](bool ahead) {
+      const MemoryNeed bytes = memoryNeed(scene, facts, ahead);
+      return bytes.host + (device ? bytes.device : 0);
+    };
+    if (const double alone = need(false); alone > worst.alone)
+      worst = {number, particlesOf(facts), need(loadsAhead(scene)), alone};
+  }
+  const auto most = static_cast<double>(limit);
+  if (worst.ahead <= most) return true;
+  if (worst.alone > most)
+    throw MachineError(fmt::format(
+        "frame {}: {} particles and a picture of {} × {} take about {} of memory, and --memory-limit is {}: a smaller "
+        "picture, fewer layers or fewer particles take less (mote info {})",
+        worst.frame, worst.particles, scene.output.size.x, scene.output.size.y, bytesText(worst.alone),
+        bytesText(most), scene.path));
+  logInfo(fmt::format("memory: frames load one by one, as loading ahead takes about {} and --memory-limit is {}",
+                      bytesText(worst.ahead), bytesText(most)));
+  return false;
+}
+
 /// Frames in their order; one that fails is noted, and the others go on.
 class Batch {
  public:
-  Batch(Scene& scene, const RenderOptions& options, Renderer& renderer, RunStats& run)
-      : scene_(scene), options_(options), renderer_(renderer), run_(run), loader_(scene) {}
+  /// `ahead`: a frame's files load while the one before is drawn.
+  Batch(Scene& scene, const RenderOptions& options, Renderer& renderer, RunStats& run, bool ahead)
+      : scene_(scene), options_(options), renderer_(renderer), run_(run), ahead_(ahead), loader_(scene) {}
 
   /// 0, or the exit code of the worst.
   int render() {
@@ -174,7 +187,7 @@ class Batch {
     const Frame frame = prepareFrame(scene_, std::move(loaded), stats);
     if (open) run_.settledBy = number;
     settled_ = true;
-    if (next) loader_.prefetch(*next);
+    if (next && ahead_) loader_.prefetch(*next);
     const Image image = renderer_.draw(frame, scene_, renderer_.light(frame, lightWanted(scene_), stats), stats);
     Timer write;
     stats.warnings = takeWarnings();
@@ -193,6 +206,7 @@ class Batch {
   const RenderOptions& options_;
   Renderer& renderer_;
   RunStats& run_;
+  bool ahead_;
   FrameLoader loader_;
   bool goOn_ = false;
   bool settled_ = false;  ///< by a frame of the shot, one of this run or before it
@@ -210,18 +224,19 @@ void dryRun(const Scene& scene, const RenderOptions& options, const CommonOption
 }
 
 int render(const RenderOptions& options, const CommonOptions& common) {
-  Scene scene = openScene(options.scene);
-  applyFlags(options, scene);
+  Scene scene = openShot(options.shot);
   parseExposure(options.exposure);
+  const std::optional<std::uint64_t> limit = parseMemoryLimit("--memory-limit", options.memoryLimit);
   checkOutputs(options, scene);
   if (options.dryRun) return dryRun(scene, options, common), 0;
   checkSequences(scene);
 
   std::unique_ptr<Gpu> gpu;
   const Backends backends = chooseBackends(scene.lighting.backend, scene.view.backend, deviceOptions(common), gpu);
+  const bool ahead = !limit || mayLoadAhead(scene, *limit, gpu && gpu->device().isCpu());
   RunStats run = runOf(scene, backends, gpu.get());
   Renderer renderer(backends, gpu.get());
-  const int exitCode = Batch(scene, options, renderer, run).render();
+  const int exitCode = Batch(scene, options, renderer, run, ahead).render();
   requireNoValidationMessages(gpu.get());
   if (!options.stats.empty()) writeWholeFile(options.stats, statsJson(run));
   return exitCode;
@@ -235,23 +250,22 @@ RunStats runOf(const Scene& scene, const Backends& backends, const Gpu* gpu) {
   run.lighting = backends.gpuLighting ? "gpu" : "cpu";
   run.raster = backends.gpuRaster ? "gpu" : "cpu";
   run.threads = threadCount();
-  run.settings = settingsOf(scene, run);
+  run.settings = settingsOf(scene);
   return run;
 }
 
 void addRenderCommand(CLI::App& app, const CommonOptions& common, int& exitCode) {
   auto options = std::make_shared<RenderOptions>();
   CLI::App* command = app.add_subcommand("render", "Render a scene to OpenEXR");
-  addSceneOptions(*command, options->scene);
-  command->add_option("-o,--output", options->output, "Picture to write; #### is the frame number")
-      ->type_name("OUT.exr");
-  command->add_option("--frames", options->frames, "Frames A-B, or A-BxS for every S-th")->type_name("A-B[xS]");
-  command->add_option("--size", options->size, "Picture size in pixels")->type_name("WxH");
-  command->add_option("--lighting", options->lighting, "Where lighting runs: cpu, gpu or auto")->type_name("WHERE");
-  command->add_option("--raster", options->raster, "Where splats are drawn: cpu, gpu or auto")->type_name("WHERE");
+  addShotOptions(*command, options->shot);
   command->add_option("--preview", options->preview, "Also write an sRGB preview")->type_name("OUT.png");
   command->add_option("--exposure", options->exposure, "Stops for the preview, or auto")->type_name("EV");
   command->add_option("--stats", options->stats, "Write counts, seconds and memory as JSON")->type_name("OUT.json");
+  command
+      ->add_option("--memory-limit", options->memoryLimit,
+                   "Memory that the run may take on the host: bytes, 512M or 1.5G; frames that need more are refused "
+                   "before any work")
+      ->type_name("SIZE");
   command->add_flag("--resume", options->resume,
                     "Leave out frames whose picture is whole and was made from the same files and settings");
   CLI::Option* dryRun = command->add_flag(

@@ -1,6 +1,8 @@
 // What the commands that take a scene share: how a scene is opened, and how a frame becomes files.
 #pragma once
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +30,9 @@ Scene openScene(const SceneOptions& options);
 
 /// "cpu", "gpu" or "auto"; throws InputError naming `flag` otherwise. Empty keeps `fallback`.
 Backend parseBackend(const std::string& flag, const std::string& text, Backend fallback);
+
+/// "1500000", "512M", "1.5G" (K, M, G, T: powers of 1024); none where it is empty. Throws InputError naming `flag`.
+std::optional<std::uint64_t> parseMemoryLimit(const std::string& flag, const std::string& text);
 
 /// The device that the flags ask for; throws InputError for a memory limit that is none.
 DeviceOptions deviceOptions(const CommonOptions& common);

@@ -34,10 +34,12 @@ bool hasSources(const std::vector<FrameInput>& inputs, const Scene& scene, int f
 
 }  // namespace
 
-std::string settingsOf(const Scene& scene, const RunStats& run) {
-  return sha256OfText(fmt::format("{} {} {} {} {}x{} strict {} hold {} {}", MOTE_VERSION, run.device,
-                                  run.lighting, run.raster, scene.output.size.x, scene.output.size.y,
-                                  scene.inputs.strict, scene.inputs.missing == MissingFrames::Hold, scene.settings));
+std::string settingsOf(const Scene& scene) {
+  const auto number = [](auto choice) { return static_cast<int>(choice); };
+  return sha256OfText(fmt::format("{} lighting {} raster {} {}x{} strict {} hold {} {}", MOTE_VERSION,
+                                  number(scene.lighting.backend), number(scene.view.backend), scene.output.size.x,
+                                  scene.output.size.y, scene.inputs.strict,
+                                  scene.inputs.missing == MissingFrames::Hold, scene.settings));
 }
 
 bool isRendered(const std::string& path, const Scene& scene, int frame, const RunStats& run) {

@@ -8,8 +8,8 @@
 namespace mote {
 
 /// SHA-256 of everything but the input files that a picture may depend on: the program's version, the scene with all
-/// flags applied, and where it is computed. Which frames a run draws is no part of it.
-std::string settingsOf(const Scene& scene, const RunStats& run);
+/// flags applied. Which frames a run draws is no part of it, nor what "auto" came to: another machine may go on.
+std::string settingsOf(const Scene& scene);
 
 /// Whether the picture at `path` is whole, was made with the run's settings, what the scene leaves open settled by the
 /// same frame (RunStats::settledBy), and from files that have not changed since.

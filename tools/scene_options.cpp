@@ -45,9 +45,8 @@ Backend parseBackend(const std::string& flag, const std::string& text, Backend f
 
 namespace {
 
-/// "1500000", "512M", "1.5G" (K, M, G, T: powers of 1024) or "80%" of the device's heap; empty: the default.
-MemoryLimit parseDeviceMemory(const std::string& text) {
-  if (text.empty()) return {};
+/// "1500000", "512M", "1.5G" (K, M, G, T: powers of 1024) or "80%"; none for anything else.
+std::optional<MemoryLimit> memoryIn(const std::string& text) {
   double value = 0;
   const char* const last = text.data() + text.size();
   const auto [end, error] = std::from_chars(text.data(), last, value, std::chars_format::fixed);
@@ -55,16 +54,30 @@ MemoryLimit parseDeviceMemory(const std::string& text) {
   constexpr std::string_view kUnits = "KMGT";
   const std::size_t power = unit.size() == 1 ? kUnits.find(unit[0]) : std::string_view::npos;
   const bool known = unit.empty() || unit == "%" || power != std::string_view::npos;
-  if (error == std::errc() && known && unit == "%" && value > 0 && value <= 100) return {.share = value / 100};
+  if (error == std::errc() && known && unit == "%" && value > 0 && value <= 100)
+    return MemoryLimit{.share = value / 100};
   const double bytes = power == std::string_view::npos ? value : std::ldexp(value, 10 * (static_cast<int>(power) + 1));
   // A double is exact up to 2⁵³, far more than any device has.
   if (error == std::errc() && known && unit != "%" && bytes >= 1 && bytes <= 0x1p53)
-    return {.bytes = static_cast<std::uint64_t>(bytes)};
+    return MemoryLimit{.bytes = static_cast<std::uint64_t>(bytes)};
+  return {};
+}
+
+/// Of the device's heap; empty: the default.
+MemoryLimit parseDeviceMemory(const std::string& text) {
+  if (text.empty()) return {};
+  if (const std::optional<MemoryLimit> limit = memoryIn(text)) return *limit;
   throw InputError("--device-memory", "", "bytes (1500000, 512M, 1.5G), or a share of the device's memory up to 100%",
                    "\"" + text + "\"");
 }
 
 }  // namespace
+
+std::optional<std::uint64_t> parseMemoryLimit(const std::string& flag, const std::string& text) {
+  if (text.empty()) return {};
+  if (const std::optional<MemoryLimit> limit = memoryIn(text); limit && limit->bytes) return limit->bytes;
+  throw InputError(flag, "", "bytes (1500000, 512M, 1.5G)", "\"" + text + "\"");
+}
 
 DeviceOptions deviceOptions(const CommonOptions& common) {
   return {.device = common.device, .validate = common.validate, .memory = parseDeviceMemory(common.deviceMemory)};
