@@ -14,6 +14,7 @@ packages=(
   libassimp-dev libembree-dev libcli11-dev nlohmann-json3-dev libfmt-dev libhwy-dev libgtest-dev
   libopenvdb-dev libboost-dev libnanovdb-dev
   imagemagick fonts-dejavu-core python3 python3-numpy
+  slurmctld slurmd slurm-client munge ffmpeg
 )
 for group in "$@"; do
   case "$group" in

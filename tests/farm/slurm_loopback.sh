@@ -5,6 +5,7 @@
 #                                       afterwards SLURM_CONF=DIR/slurm.conf lets sbatch and the others find them
 # slurm_loopback.sh crash DIR NODE      what a power cut does: SIGKILL to the node's slurmd, its jobs and their processes;
 #                                       then the node boots, and Slurm learns that its jobs are gone
+# slurm_loopback.sh jobs DIR [NODE]     the process ids of what jobs run now, one a line
 # slurm_loopback.sh logs DIR            the daemons' logs
 # slurm_loopback.sh stop DIR            ends jobs and daemons and removes DIR
 # Debian 12's packages slurmctld, slurmd, slurm-client and munge. Any user that has a name will do: daemons and jobs run
@@ -234,11 +235,12 @@ stop() {
   rm -rf -- "$dir"
 }
 
-usage() { die 2 "usage: slurm_loopback.sh start DIR [NODES] | crash DIR NODE | logs DIR | stop DIR"; }
+usage() { die 2 "usage: slurm_loopback.sh start DIR [NODES] | crash DIR NODE | jobs DIR [NODE] | logs DIR | stop DIR"; }
 
 case "${1:-}/$#" in
   start/2 | start/3) start "${@:2}" ;;
   crash/3) crash "$2" "$3" ;;
+  jobs/2 | jobs/3) job_processes "$(realpath -- "$2")" "${3:-}" ;;
   logs/2) print_logs "$2" ;;
   stop/2) stop "$2" ;;
   *) usage ;;
