@@ -30,9 +30,10 @@ void append(std::string& text, const JsonNode& node, const std::string& pointer)
   for (const JsonMember* member : members) {
     const std::string child = childPointer(pointer, member->key);
     if (std::find(std::begin(kNoMatter), std::end(kNoMatter), child) != std::end(kNoMatter)) continue;
-    text += nlohmann::json(member->key).dump() + ':';
-    append(text, member->value, child);
-    text += ',';
+    std::string value;
+    append(value, member->value, child);
+    if (value == "{}") continue;  // "frames" may be left of what does not matter
+    text += nlohmann::json(member->key).dump() + ':' + value + ',';
   }
   text += '}';
 }

@@ -51,7 +51,7 @@ TEST_F(MoteFarm, WritesTheShotAsAnArrayJob) {
   EXPECT_FALSE(contains(frames, "@"));
   // bash takes all of them.
   for (const char* script : {"frames.sbatch", "finish.sbatch", "submit.sh"})
-    EXPECT_EQ(runProcess({"bash", "-n", shot_ + "/scene.farm/" + script}).exitCode, 0) << script;
+    EXPECT_EQ(runProcess({"/bin/bash", "-n", shot_ + "/scene.farm/" + script}).exitCode, 0) << script;
 }
 
 TEST_F(MoteFarm, RefusesWhatCannotBecomeOne) {
@@ -63,8 +63,14 @@ TEST_F(MoteFarm, RefusesWhatCannotBecomeOne) {
   const ProcessResult many = slurm({"--frames", "1-2001", "--per-task", "2", "-o", "o.#.exr"});
   EXPECT_EQ(many.exitCode, 2);
   EXPECT_TRUE(contains(many.err, "--per-task: expected at most 1000 tasks, got 1001"));
-  const ProcessResult noSlurm = slurm({"--frames", "1-2", "-o", "o.#.exr", "--submit"});
-  if (!std::filesystem::exists("/usr/bin/sbatch")) EXPECT_EQ(noSlurm.exitCode, 3);
+  // Without a Slurm.
+  ProcessOptions alone = kWithoutVulkan;
+  alone.environment["PATH"] = "/nonexistent";
+  const ProcessResult noSlurm = mote({"farm", "slurm", shot_ + "/scene.json", "--lighting", "cpu", "--raster", "cpu",
+                                      "--frames", "1-2", "-o", "o.#.exr", "--submit"},
+                                     alone);
+  EXPECT_EQ(noSlurm.exitCode, 3);
+  EXPECT_TRUE(contains(noSlurm.err, "submit.sh: Slurm did not take the job"));
 }
 
 TEST_F(MoteFarm, ChecksWhetherAllIsThere) {
