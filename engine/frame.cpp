@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "engine/splats.h"
 #include "host/core/error.h"
 #include "host/core/log.h"
 #include "host/core/parallel.h"
+#include "host/core/progress.h"
 #include "host/core/sampling.h"
 #include "host/core/timer.h"
 #include "host/lighting/auto_subsample.h"
@@ -187,7 +189,12 @@ layout::uint endpointCode(Endpoint endpoint) {
 }
 
 Frame prepareFrame(Scene& scene, int number, FrameStats& stats, FramePurpose purpose) {
-  return prepareFrame(scene, loadFrame(scene, number, purpose), stats);
+  FrameFiles files;
+  {
+    const Progress progress("load");
+    files = loadFrame(scene, number, purpose);
+  }
+  return prepareFrame(scene, std::move(files), stats);
 }
 
 Frame prepareFrame(Scene& unsettled, FrameFiles files, FrameStats& stats) {
@@ -204,8 +211,13 @@ Frame prepareFrame(Scene& unsettled, FrameFiles files, FrameStats& stats) {
   stats.seconds["load"] = files.seconds;
   Timer timer;
 
-  prepareSolids(scene, frame);
+  {
+    std::optional<Progress> progress;
+    if (!scene.solids.empty()) progress.emplace("solids");
+    prepareSolids(scene, frame);
+  }
   if (!scene.solids.empty()) stats.seconds["solids"] = timer.lap();
+  const Progress progress("octree");
 
   fitDefaults(scene, frame.particles.supportBounds());
   for (const LightSource& light : scene.lights) {

@@ -5,6 +5,7 @@
 #include "engine/splats.h"
 #include "host/core/log.h"
 #include "host/core/parallel.h"
+#include "host/core/progress.h"
 #include "host/core/sha256.h"
 #include "host/core/timer.h"
 #include "host/particles/particle_loader.h"
@@ -47,6 +48,7 @@ FrameFiles loadFrame(const Scene& scene, int number, FramePurpose purpose) {
 }
 
 FrameFiles FrameLoader::take(int number) {
+  const Progress progress("load");
   if (!next_.valid() || number_ != number) return loadFrame(scene_, number, purpose_);
   return next_.get();
 }

@@ -1,7 +1,10 @@
 #include "engine/lighting.h"
 
-#include "host/core/log.h"
+#include <algorithm>
+#include <atomic>
+
 #include "host/core/parallel.h"
+#include "host/core/progress.h"
 #include "host/lighting/irradiance.h"
 #include "host/solids/occlusion.h"
 
@@ -27,6 +30,29 @@ std::vector<std::uint8_t> reachedBy(const layout::Light& light, const Receivers&
   });
   return reached;
 }
+
+/// Rays of one light, as they are done. How many there will be is not known before: those that no light reaches are not
+/// sent, and what an approximation left too far off is done again.
+class RayCount {
+ public:
+  RayCount(Progress& progress, std::size_t perPass) : progress_(progress), perPass_(perPass), expected_(perPass) {}
+  ~RayCount() { progress_.advance(static_cast<double>(expected_ - std::min<std::size_t>(done_, expected_))); }
+  RayCount(const RayCount&) = delete;
+  RayCount& operator=(const RayCount&) = delete;
+
+  void advance(std::size_t rays) {
+    const std::size_t done = done_ += rays;
+    for (std::size_t expected = expected_; done > expected;)
+      if (expected_.compare_exchange_weak(expected, expected + perPass_))
+        progress_.expect(static_cast<double>(perPass_)), expected += perPass_;
+    progress_.advance(static_cast<double>(rays));
+  }
+
+ private:
+  Progress& progress_;
+  const std::size_t perPass_;
+  std::atomic<std::size_t> done_{0}, expected_;
+};
 
 /// Takes out of `reached` what solids keep in the dark.
 void leaveOut(const std::vector<std::uint8_t>& blocked, std::vector<std::uint8_t>& reached) {
@@ -81,10 +107,11 @@ LitParticles lightParticles(const Frame& frame, const ShadowSources& sources, Li
   const std::vector<float> radii = receiverRadii(frame);
   LitParticles lit;
   lit.radiance.assign(count, vec3(0));
-  Progress progress("lighting", static_cast<double>(count) * static_cast<double>(frame.lights.size()));
+  Progress progress("lighting", static_cast<double>(count) * static_cast<double>(frame.lights.size()), "rays");
   for (const layout::Light& light : frame.lights) {
-    std::vector<float> transmittance = shadows(frame, receivers, light, sources,
-                                               [&](std::size_t rays) { progress.advance(static_cast<double>(rays)); });
+    RayCount done(progress, count);
+    std::vector<float> transmittance =
+        shadows(frame, receivers, light, sources, [&done](std::size_t rays) { done.advance(rays); });
     if (wanted.byLight) {
       std::vector<vec3>& own = lit.byLight.emplace_back(count, vec3(0));
       addInScattering(receivers, radii, light, transmittance, frame.scattering, own);

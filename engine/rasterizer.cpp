@@ -14,6 +14,7 @@
 #include "engine/passes/splat_pass.h"
 #include "engine/vulkan/barrier.h"
 #include "host/core/log.h"
+#include "host/core/progress.h"
 #include "host/core/timer.h"
 #include "host/splat/rasterize_full.h"
 #include "host/splat/small_splats.h"
@@ -31,14 +32,17 @@ class HostRasterizer : public Rasterizer {
  public:
   HostRasterizer(SplatSet set, float keyScale, FrameStats& stats) : set_(std::move(set)), stats_(stats) {
     Timer timer;
+    const Progress progress("sort");
     order_ = sortByDepth(set_.particles, set_.camera(), keyScale);
     stats_.seconds["sort"] += timer.lap();
   }
 
   Image draw(std::span<const float> surfaces, SplatLayers layers) override {
     Timer timer;
-    Image image = fast(set_, surfaces, layers) ? rasterize(set_.particles, order_, set_.camera(), layers.depth)
-                                               : rasterizeFull(set_, order_, surfaces, layers);
+    Progress progress("splat", static_cast<double>(order_.size()), "particles");
+    const auto done = [&progress](double splats) { progress.advance(splats); };
+    Image image = fast(set_, surfaces, layers) ? rasterize(set_.particles, order_, set_.camera(), layers.depth, done)
+                                               : rasterizeFull(set_, order_, surfaces, layers, done);
     stats_.seconds["splat"] += timer.lap();
     return image;
   }
@@ -68,6 +72,7 @@ class DeviceRasterizer : public Rasterizer {
         keyScale_(keyScale),
         count_(static_cast<std::uint32_t>(set_.particles.size())) {
     Timer timer;
+    const Progress progress("sort");
     std::vector<std::uint64_t> sizes = drawnSizes(count_);
     sizes.push_back(SortPass::pairBytes(count_));
     if (count_ <= SortPass::kMaxCount && arraysFit(device, sizes, device.stagingCost()))
@@ -79,7 +84,7 @@ class DeviceRasterizer : public Rasterizer {
 
   Image draw(std::span<const float> surfaces, SplatLayers layers) override {
     Timer timer;
-    Progress progress("splat", count_);
+    Progress progress("splat", count_, "particles");
     Image image =
         fast(set_, surfaces, layers) ? drawFast(layers.depth, progress) : drawFull(surfaces, layers, progress);
     stats_.seconds["splat"] += timer.lap();

@@ -10,8 +10,9 @@
 #include "engine/splats.h"
 #include "engine/surface_light.h"
 #include "host/core/error.h"
-#include "host/core/log.h"
+#include "host/core/log_event.h"
 #include "host/core/parallel.h"
+#include "host/core/progress.h"
 #include "host/core/timer.h"
 #include "host/lighting/exact/beam_kernel.h"
 #include "host/solids/surfaces.h"
@@ -33,6 +34,22 @@ std::unique_ptr<Gpu> tryOpen(const DeviceOptions& options, bool needed, std::str
   }
 }
 
+/// `device`: "" where none is used, because of `why` where there is a reason.
+void logChoice(const Backends& chosen, const std::string& device, const std::string& why) {
+  const std::string host = fmt::format("{} threads, {}", threadCount(), simdTargets().front());
+  std::string text = fmt::format("lighting and picture on the CPU ({}); Vulkan is not used", host);
+  if (!why.empty()) text += ": " + why;
+  if (chosen.anyGpu())
+    text = fmt::format("lighting on the {}, picture on the {} ({}; {})", place(chosen.gpuLighting),
+                       place(chosen.gpuRaster), device, host);
+  logEvent("info",
+           {{"message", text},
+            {"lighting", chosen.gpuLighting ? "gpu" : "cpu"},
+            {"raster", chosen.gpuRaster ? "gpu" : "cpu"},
+            {"device", device.empty() ? "none" : device}},
+           text);
+}
+
 }  // namespace
 
 Backends chooseBackends(Backend lighting, Backend raster, const DeviceOptions& options, std::unique_ptr<Gpu>& gpu) {
@@ -43,15 +60,8 @@ Backends chooseBackends(Backend lighting, Backend raster, const DeviceOptions& o
   const bool prefer = gpu && !gpu->device().isCpu();
   const Backends chosen{lighting == Backend::Gpu || (lighting == Backend::Auto && prefer),
                         raster == Backend::Gpu || (raster == Backend::Auto && prefer)};
-  const std::string host = fmt::format("{} threads, {}", threadCount(), simdTargets().front());
-  if (chosen.anyGpu())
-    logInfo(fmt::format("lighting on the {}, picture on the {} ({}; {})", place(chosen.gpuLighting),
-                        place(chosen.gpuRaster), gpu->device().name(), host));
-  else if (considered && !gpu)
-    logInfo(fmt::format("lighting and picture on the CPU ({}); Vulkan is not used: {}", host, why));
-  else
-    logInfo(fmt::format("lighting and picture on the CPU ({}); Vulkan is not used", host));
   if (!chosen.anyGpu()) gpu.reset();
+  logChoice(chosen, gpu ? gpu->device().name() : "", considered ? why : "");
   return chosen;
 }
 
@@ -258,21 +268,31 @@ Image Renderer::draw(const Frame& frame, const Scene& scene, LitParticles lit, F
   Surfaces surfaces;
   const bool seen = std::any_of(scene.solids.begin(), scene.solids.end(),
                                 [](const Solid& solid) { return solid.mode != SolidMode::Hidden; });
-  if (seen) surfaces = traceSurfaces(scene.solids, frame.meshes, frame.view);
-  if (seen) stats.seconds["solids"] += timer.lap();
+  if (seen) {
+    const Progress progress("solids");
+    surfaces = traceSurfaces(scene.solids, frame.meshes, frame.view);
+    stats.seconds["solids"] += timer.lap();
+  }
   std::vector<SurfaceLight> surfaceLights;
   if (!surfaces.empty()) {
     std::optional<DeviceShadows> device;  // gone before the splats need the memory
     if (backends_.gpuLighting) device.emplace(gpu_->device(), frame, nullptr);
     const ShadowSources sources = device ? device->sources() : hostShadows(frame);
-    for (const layout::Light& light : frame.lights)
+    Progress progress("lighting", static_cast<double>(frame.lights.size()), "lights");
+    for (const layout::Light& light : frame.lights) {
       surfaceLights.push_back(lightSurfaces(frame, scene, surfaces, light, sources));
+      progress.advance(1);
+    }
     if (device) device->addTo(stats);
     stats.seconds["lighting"] += timer.lap();
   }
 
   timer.lap();
-  SplatSet set = splatSet(frame, scene, lit.radiance);
+  SplatSet set;
+  {
+    const Progress progress("splat");
+    set = splatSet(frame, scene, lit.radiance);
+  }
   lit.radiance = {};
   stats.drawn = set.particles.size();
   stats.seconds["splat"] += timer.lap();

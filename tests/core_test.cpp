@@ -12,14 +12,19 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
+#include <stdexcept>
 #include <thread>
 
 #include "host/core/bins.h"
 #include "host/core/error.h"
 #include "host/core/log.h"
+#include "host/core/log_event.h"
 #include "host/core/output_file.h"
 #include "host/core/parallel.h"
+#include "host/core/progress.h"
 #include "host/core/random.h"
 #include "host/core/sha256.h"
 #include "host/core/timer.h"
@@ -182,6 +187,7 @@ class Log : public testing::Test {
   void SetUp() override { takeWarnings(); }
   void TearDown() override {
     setVerbosity(Verbosity::Normal);
+    setLogFormat(LogFormat::Text);
     takeWarnings();
   }
   static std::string captured(const std::function<void()>& action) {
@@ -249,10 +255,93 @@ TEST_F(Log, TakesWarningsFromManyThreads) {
 
 TEST_F(Log, DrawsNoProgressBarWhereThereIsNoTerminal) {
   EXPECT_EQ(captured([] {
-              Progress progress("lighting", 10);
+              Progress progress("lighting", 10, "rays");
               progress.advance(5);
             }),
             "");
+}
+
+TEST_F(Log, WritesOneEventALineFromManyThreads) {
+  setLogFormat(LogFormat::Json);
+  const std::string text = captured([] {
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 4; ++t)
+      threads.emplace_back([t] {
+        for (int i = 0; i < 100; ++i) logWarning(fmt::format("\xff\n\"{} {}", t, i));
+      });
+    for (std::thread& thread : threads) thread.join();
+  });
+  std::istringstream lines(text);
+  std::set<std::string> messages;
+  for (std::string line; std::getline(lines, line);) {
+    const nlohmann::json event = nlohmann::json::parse(line, nullptr, false);
+    ASSERT_TRUE(event.is_object()) << line;
+    EXPECT_EQ(event["event"], "warning");
+    messages.insert(event["message"]);
+  }
+  EXPECT_EQ(messages.size(), 400u);
+  EXPECT_TRUE(messages.contains("\xEF\xBF\xBD\n\"3 99"));  // U+FFFD stands for what is no UTF-8
+}
+
+TEST_F(Log, TellsTheFrameAtWorkAndWritesNumbersWithSixDigits) {
+  setLogFormat(LogFormat::Json);
+  const std::string text = captured([] {
+    setEventFrame(-7);
+    logEvent("a", {{"seconds", 1.23456789}, {"nothing", std::nan("")}, {"stages", LogSeconds{{"sort", 0.5}}}}, "text");
+    setEventFrame(std::nullopt);
+    logFailure("b", {{"count", std::size_t{12345678}}});
+  });
+  const std::string first = text.substr(0, text.find('\n')), second = text.substr(text.find('\n') + 1);
+  EXPECT_TRUE(contains(first, R"("event":"a","frame":-7,"seconds":1.23457,"nothing":null,"stages":{"sort":0.5}})"));
+  EXPECT_TRUE(contains(second, R"("event":"b","count":12345678})"));
+}
+
+TEST_F(Log, KeepsOnlyFailuresWhereItIsQuiet) {
+  setVerbosity(Verbosity::Quiet);
+  for (const LogFormat format : {LogFormat::Text, LogFormat::Json}) {
+    setLogFormat(format);
+    EXPECT_EQ(captured([] {
+                logEvent("a", {}, "text");
+                logWarning("w");
+                Progress progress("lighting", 10, "rays");
+              }),
+              "");
+    EXPECT_TRUE(contains(captured([] { logError("it failed", 3); }), "it failed"));
+  }
+}
+
+TEST_F(Log, TellsTheSecondsOfAStageThatEndsButNotOfOneThatFails) {
+  setLogFormat(LogFormat::Json);
+  EXPECT_TRUE(contains(captured([] { Progress progress("sort"); }), R"("event":"stage","stage":"sort","seconds":)"));
+  EXPECT_EQ(captured([] {
+              try {
+                Progress progress("sort");
+                throw std::runtime_error("");
+              } catch (const std::runtime_error&) {
+              }
+            }),
+            "");
+  // One at a time: what a stage is made of is no stage of its own.
+  const std::string text = captured([] {
+    Progress outer("outer");
+    Progress inner("inner");
+  });
+  EXPECT_TRUE(contains(text, "outer"));
+  EXPECT_FALSE(contains(text, "inner"));
+}
+
+TEST(ShortNumbers, HaveThreeDigitsAndAPrefix) {
+  EXPECT_EQ(shortCount(0), "0");
+  EXPECT_EQ(shortCount(12.345), "12.3");
+  EXPECT_EQ(shortCount(999.4), "999");
+  EXPECT_EQ(shortCount(999.5), "1 k");
+  EXPECT_EQ(shortCount(1.234e6), "1.23 M");
+  EXPECT_EQ(shortCount(5e15), "5e+03 T");
+  EXPECT_EQ(shortSeconds(0.04), "0.0 s");
+  EXPECT_EQ(shortSeconds(59.94), "59.9 s");
+  EXPECT_EQ(shortSeconds(59.96), "1:00 min");
+  EXPECT_EQ(shortSeconds(3599.4), "59:59 min");
+  EXPECT_EQ(shortSeconds(3723), "1:02:03 h");
 }
 
 // --- random -------------------------------------------------------------------------------------------------------

@@ -500,6 +500,22 @@ TEST(Rasterize, MatchesTheScalarTwinBitForBit) {
   }
 }
 
+TEST(Rasterize, TellsAllSplatsAsDone) {
+  const SplatCamera camera = cameraAtOrigin(333, 222);
+  std::vector<SplatParticle> cloud = randomCloud(camera, 2000, 12);
+  for (SplatParticle& particle : std::span(cloud).first(500)) particle.position = -particle.position;  // behind it
+  for (const std::size_t count : {2000, 500}) {
+    std::mutex mutex;
+    double sum = 0;
+    rasterize(cloud, identity(count), camera, true, [&](double splats) {
+      const std::scoped_lock lock(mutex);
+      EXPECT_GT(splats, 0);
+      sum += splats;
+    });
+    EXPECT_NEAR(sum, static_cast<double>(count), 1e-6);  // rounding of some hundred additions
+  }
+}
+
 TEST(Rasterize, EveryInstructionSetGivesTheSameBits) {
   const SplatCamera camera = cameraAtOrigin(150, 110, 60);
   const std::vector<SplatParticle> cloud = randomCloud(camera, 500, 20);

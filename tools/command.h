@@ -17,6 +17,7 @@ struct CommonOptions {
   std::string device;        ///< Vulkan device by number or part of its name; empty: the best
   std::string deviceMemory;  ///< how much of its memory may be held; empty: MemoryLimit's default
   bool validate = false;     ///< validation and synchronization layers on; any message makes the command fail with 3
+  std::string log = "text";  ///< "text" or "json": what stderr is in
   bool quiet = false, verbose = false;
 };
 

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/core/error.h"
+#include "host/core/log.h"
 #include "host/image/exr.h"
 #include "host/particles/formats/particle_file.h"
 #include "host/scene/missing_file.h"
@@ -72,7 +73,7 @@ void info(const std::vector<std::string>& files, bool json, bool measured, const
     } catch (const InputError& error) {
       ++wrong;
       std::fflush(stdout);
-      fmt::print(stderr, "mote: {}\n", error.what());
+      logError(error.what(), kBadInput);
     }
   }
   if (wrong > 0) throw InputError(fmt::format("{} of {} files are not what they should be", wrong, files.size()));

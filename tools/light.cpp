@@ -5,6 +5,7 @@
 #include "host/core/log.h"
 #include "host/core/output_file.h"
 #include "host/core/parallel.h"
+#include "host/core/progress.h"
 #include "host/particles/formats/prt_writer.h"
 #include "host/scene/frame_path.h"
 #include "tools/render.h"
@@ -69,7 +70,10 @@ void light(const LightOptions& options, const CommonOptions& common) {
   const Frame frame = prepareFrame(scene, number, stats, FramePurpose::Light);
   const LitParticles lit = renderer.light(frame, {.transmittance = true}, stats);
   requireNoValidationMessages(gpu.get());
-  writeLit(path, frame, lit);
+  {
+    const Progress progress("write");
+    writeLit(path, frame, lit);
+  }
   logInfo(fmt::format("frame {}: {} particles, {} lights, lighting {:.1f} s -> {}", number, stats.particles,
                       stats.lights, stats.seconds["lighting"], path));
 }

@@ -1,17 +1,21 @@
 // mote: one program, one file a subcommand. The only place that catches exceptions and makes exit codes of them.
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <new>
 #include <optional>
+#include <string_view>
 
 #include "host/core/error.h"
+#include "host/core/error_line.h"
+#include "host/core/foreign_lines.h"
 #include "host/core/log.h"
+#include "host/core/log_event.h"
 #include "host/core/output_file.h"
 #include "host/core/parallel.h"
+#include "host/core/timer.h"
 #include "host/scene/json_reader.h"
 #include "tools/command.h"
 
@@ -34,6 +38,9 @@ void addCommonOptions(CLI::App& app, CommonOptions& common) {
       ->type_name("SIZE");
   app.add_flag("--validate", common.validate,
                "Turn the Vulkan validation layers on; any message of theirs is a failure");
+  app.add_option("--log", common.log, "What stderr is in: text, or json, one event a line (docs/log.md)")
+      ->type_name("text|json")
+      ->check(CLI::IsMember({"text", "json"}).description(""));
   CLI::Option* quiet = app.add_flag("-q,--quiet", common.quiet, "Print nothing but errors to stderr");
   app.add_flag("-v,--verbose", common.verbose, "Print more to stderr")->excludes(quiet);
 }
@@ -80,17 +87,41 @@ std::string aboutCommands(const CLI::App& app) {
 int reportUsage(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App* command = usedCommand(&app);
   const std::string about = aboutCommands(app);
-  fmt::print(stderr, "mote: {}\nRun '{} --help' for what it takes.\n", about.empty() ? error.what() : about,
-             fullName(command));
+  logError(
+      fmt::format("{}\nRun '{} --help' for what it takes.", about.empty() ? error.what() : about, fullName(command)),
+      kBadInput);
   return kBadInput;
 }
 
-int report(const char* message, int exitCode) {
-  fmt::print(stderr, "mote: {}\n", message);
+int report(const std::string& message, int exitCode) {
+  logError(message, exitCode);
   return exitCode;
 }
 
-int run(int argc, char** argv) {
+/// What `--log` asks for, before anything else is read: wrong usage too is told that way.
+LogFormat logFormatOf(int argc, char** argv) {
+  LogFormat format = LogFormat::Text;
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view argument(argv[i]);
+    if (argument == "--") break;
+    const bool json =
+        argument == "--log=json" || (argument == "--log" && i + 1 < argc && std::string_view(argv[i + 1]) == "json");
+    if (json) format = LogFormat::Json;
+  }
+  return format;
+}
+
+void logStart(const CLI::App& app, const CommonOptions& common) {
+  logEvent("start", {{"version", MOTE_VERSION},
+                     {"command", fullName(usedCommand(&app))},
+                     {"threads", threadCount()},
+                     {"device", common.device.empty() ? "auto" : common.device}});
+}
+void logEnd(int exitCode, const Timer& sinceStart) {
+  logEvent("end", {{"exit_code", exitCode}, {"seconds", sinceStart.seconds()}});
+}
+
+int run(int argc, char** argv, std::atomic<bool>& started) {
   CommonOptions common;
   int exitCode = 0;
   CLI::App app("Renders particle data sets as participating media.", "mote");
@@ -99,7 +130,7 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.fallthrough();  // the subcommands, made after it, inherit it: common flags may follow them
   app.footer(
-      "Any command also takes --threads, --device, --device-memory, --validate, -q and -v (mote --help).\n"
+      "Any command also takes --threads, --device, --device-memory, --validate, --log, -q and -v (mote --help).\n"
       "Exit codes: 0 done, 1 a comparison failed, 2 bad input or usage, 3 the machine (device, memory, disk), "
       "130 interrupted, 143 ended.");
   addCommonOptions(app, common);
@@ -113,6 +144,8 @@ int run(int argc, char** argv) {
   app.parse_complete_callback([&] {  // runs before the subcommand's own callback
     setVerbosity(common.quiet ? Verbosity::Quiet : common.verbose ? Verbosity::Verbose : Verbosity::Normal);
     threads.emplace(common.threads);
+    started = true;
+    logStart(app, common);
   });
   try {
     app.parse(argc, argv);
@@ -130,10 +163,18 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   using namespace mote;
   int exitCode = 0;
+  static const Timer sinceStart;  // static: a signal may come while the process ends
+  static std::atomic<bool> started{false};
+  std::optional<ForeignLines> foreign;
+  setLogFormat(logFormatOf(argc, argv));
   try {
     std::signal(SIGXFSZ, SIG_IGN);  // a file-size limit is a failed write with a message, not a killed process
-    removeTemporaryFilesOnSignal();
-    exitCode = run(argc, argv);
+    removeTemporaryFilesOnSignal([](int code) {
+      wipeBar();
+      if (started) logEnd(code, sinceStart);
+    });
+    if (logFormat() == LogFormat::Json) foreign.emplace();
+    exitCode = run(argc, argv, started);
     if (std::fflush(stdout) != 0) exitCode = report("writing to stdout failed", kMachine);
   } catch (const InputError& error) {
     exitCode = report(error.what(), kBadInput);
@@ -143,7 +184,9 @@ int main(int argc, char** argv) {
     exitCode = report("memory ran out; fewer particles or a smaller picture need less (mote info SCENE says how much)",
                       kMachine);
   } catch (const std::exception& error) {
-    exitCode = report(fmt::format("internal error, a bug in mote: {}", error.what()).c_str(), kMachine);
+    exitCode = report(fmt::format("internal error, a bug in mote: {}", error.what()), kMachine);
   }
+  foreign.reset();
+  if (started) logEnd(exitCode, sinceStart);
   return exitCode;
 }

@@ -12,8 +12,10 @@
 #include "engine/settling.h"
 #include "host/core/error.h"
 #include "host/core/log.h"
+#include "host/core/log_event.h"
 #include "host/core/output_file.h"
 #include "host/core/parallel.h"
+#include "host/core/progress.h"
 #include "host/core/timer.h"
 #include "host/image/png.h"
 #include "host/scene/frame_path.h"
@@ -122,11 +124,18 @@ class Batch {
   int render() {
     const std::vector<int> frames = framesToDraw();
     goOn_ = frames.size() + run_.skipped.size() > 1 && !options_.stopOnError;
-    for (std::size_t k = 0; k < frames.size(); ++k)
-      draw(frames[k], k + 1 < frames.size() ? std::optional(frames[k + 1]) : std::nullopt);
-    if (!run_.failed.empty())
-      fmt::print(stderr, "mote: {} of {} frames failed:{}\n", run_.failed.size(),
-                 run_.failed.size() + run_.frames.size() + run_.skipped.size(), frameTable(run_, scene_.frames.step));
+    BatchProgress progress(frames.size());
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+      progress.begin(frames[k]);
+      const bool written = draw(frames[k], k + 1 < frames.size() ? std::optional(frames[k + 1]) : std::nullopt);
+      progress.end(written);
+    }
+    logSummary(run_.failed.size());
+    if (!run_.failed.empty() && logFormat() == LogFormat::Text)
+      logFailure("", {},
+                 fmt::format("mote: {} of {} frames failed:{}", run_.failed.size(),
+                             run_.failed.size() + run_.frames.size() + run_.skipped.size(),
+                             frameTable(run_, scene_.frames.step)));
     return exitCode_;
   }
 
@@ -135,10 +144,15 @@ class Batch {
   std::vector<int> framesToDraw() {
     std::vector<int> frames;
     if (options_.resume) settle({});
+    std::optional<Progress> progress;
+    if (options_.resume)
+      progress.emplace("resume", 1 + (scene_.frames.last - scene_.frames.first) / scene_.frames.step, "frames");
     for (int number = scene_.frames.first; number <= scene_.frames.last; number += scene_.frames.step) {
       const bool there = options_.resume && isRendered(framePath(scene_.output.file, number), scene_, number, run_) &&
                          (options_.preview.empty() || std::filesystem::exists(framePath(options_.preview, number)));
       (there ? run_.skipped : frames).push_back(number);
+      if (there) logEvent("frame_skipped", {{"frame", number}, {"file", framePath(scene_.output.file, number)}});
+      if (progress) progress->advance(1);
     }
     if (options_.resume)
       logInfo(fmt::format("resume: {} of {} frames are there already", run_.skipped.size(),
@@ -150,16 +164,26 @@ class Batch {
     run_.settledBy = settleByShot(scene_, before);
     settled_ = run_.settledBy.has_value();
   }
-  void draw(int number, std::optional<int> next) {
+  void logSummary(std::size_t failed) const {
+    logEvent("summary", {{"written", run_.frames.size()}, {"failed", failed}, {"skipped", run_.skipped.size()}});
+  }
+  /// True where the frame was written.
+  bool draw(int number, std::optional<int> next) {
     const auto fail = [&](int code, const std::string& error) {
-      if (!goOn_) throw;  // the error of the run
-      fmt::print(stderr, "mote: frame {}: {}\n", number, error);
+      logFailure("frame_failed", {{"error", error}, {"exit_code", code}},
+                 goOn_ ? fmt::format("mote: frame {}: {}", number, error) : "");
+      if (!goOn_) {
+        setEventFrame(std::nullopt);
+        logSummary(1);
+        throw;  // the error of the run
+      }
       run_.failed.push_back({number, error});
       takeWarnings();  // they are not the next frame's
       exitCode_ = std::max(exitCode_, code);
     };
     try {
       drawFrame(number, next);
+      return true;
     } catch (const InputError& error) {
       fail(kBadInput, error.what());
     } catch (const MachineError& error) {
@@ -167,6 +191,7 @@ class Batch {
     } catch (const std::bad_alloc&) {
       fail(kMachine, "memory ran out");
     }
+    return false;
   }
   /// The frame's files; where they are far from 0 and the scene gives no origin, measured from that of the shot.
   FrameFiles files(int number) {
@@ -191,14 +216,19 @@ class Batch {
     const Image image = renderer_.draw(frame, scene_, renderer_.light(frame, lightWanted(scene_), stats), stats);
     Timer write;
     stats.warnings = takeWarnings();
-    writeFrameExr(path, image, frame, scene_, run_, stats);
-    if (!options_.preview.empty())
-      writePng(framePath(options_.preview, number), image,
-               parseExposure(options_.exposure).value_or(autoExposure(image)));
+    {
+      const Progress progress("write");
+      writeFrameExr(path, image, frame, scene_, run_, stats);
+      if (!options_.preview.empty())
+        writePng(framePath(options_.preview, number), image,
+                 parseExposure(options_.exposure).value_or(autoExposure(image)));
+    }
     stats.seconds["write"] = write.seconds();
     stats.seconds["total"] = total.seconds();
-    logInfo(fmt::format("frame {}: {} particles, {} lights, {:.1f} s ({}) -> {}", number, stats.particles,
-                        stats.lights, stats.seconds["total"], stageSeconds(stats), path));
+    logEvent("frame_done",
+             {{"file", path}, {"seconds", stats.seconds}, {"particles", stats.particles}, {"lights", stats.lights}},
+             fmt::format("frame {}: {} particles, {} lights, {:.1f} s ({}) -> {}", number, stats.particles,
+                         stats.lights, stats.seconds["total"], stageSeconds(stats), path));
     run_.frames.push_back(std::move(stats));
   }
 

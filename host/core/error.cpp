@@ -1,7 +1,9 @@
 #include "host/core/error.h"
 
-#include <cstdio>
+#include <csignal>
 #include <cstdlib>
+
+#include "host/core/log.h"
 
 namespace mote {
 namespace {
@@ -23,7 +25,9 @@ InputError::InputError(std::string_view place, std::string_view field, std::stri
 
 void detail::checkFailed(const char* expression, const std::string& left, const std::string& right, const char* file,
                          int line) {
-  fmt::print(stderr, "mote: internal error at {}:{}: {} fails: {} against {}\n", file, line, expression, left, right);
+  constexpr int kAborted = 128 + SIGABRT;  // what shells make of it
+  logError(fmt::format("internal error at {}:{}: {} fails: {} against {}", file, line, expression, left, right),
+           kAborted);
   std::abort();
 }
 

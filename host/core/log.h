@@ -1,4 +1,5 @@
-// Messages for people: all of them go to stderr, so that stdout stays a program's answer.
+// Messages: all of them go to stderr, so that stdout stays a program's answer. With `--log json` each is an event
+// (log_event.h) instead of a line.
 #pragma once
 #include <fmt/format.h>
 
@@ -21,6 +22,9 @@ void logVerbose(const std::string& line);
 /// A warning: printed once however often it is raised, and kept for `--stats`. Safe from any thread.
 void logWarning(const std::string& line);
 
+/// What ends the command, or a part of it: "mote: …", with -q too; `exitCode` is what it comes to.
+void logError(const std::string& message, int exitCode);
+
 /// The warnings raised since the last call, in order; clears the list (also of what counts as printed).
 std::vector<std::string> takeWarnings();
 
@@ -35,20 +39,6 @@ class WarningsKept {
 
  private:
   std::vector<std::string>* before_;
-};
-
-/// A bar on a terminal, nothing elsewhere. Safe from any thread; `done` counts in the unit of `total`.
-class Progress {
- public:
-  Progress(std::string stage, double total);
-  ~Progress();
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
-  void advance(double done);
-
- private:
-  struct State;
-  State* state_;  // null where no bar is drawn
 };
 
 }  // namespace mote

@@ -6,10 +6,12 @@
 
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <future>
 #include <mutex>
 #include <set>
 #include <system_error>
@@ -34,15 +36,32 @@ LivingTemporaries& livingTemporaries() {
 }
 
 constexpr int kSignalled = 128;  // and the signal's number: what shells make of it
+/// A terminal that was stopped, or a pipe that nobody reads, must not keep a process from ending.
+constexpr std::chrono::milliseconds kLastCall{200};
+
+/// Calls it on a thread of its own, and goes on without it where it takes longer.
+void callWithin(std::chrono::milliseconds limit, const std::function<void()>& call) {
+  std::promise<void> done;
+  try {
+    std::thread([&] {
+      call();
+      done.set_value();
+    }).detach();
+    done.get_future().wait_for(limit);
+  } catch (const std::system_error&) {
+    // No thread is left for it.
+  }
+}
 
 /// Takes one signal of the set and ends the process.
-[[noreturn]] void endOnSignal(sigset_t signals) {
+[[noreturn]] void endOnSignal(sigset_t signals, const std::function<void(int exitCode)>& last) {
   int signal = 0;
   while (sigwait(&signals, &signal) != 0) {
   }
   LivingTemporaries& living = livingTemporaries();
   living.mutex.lock();
   for (const std::string& path : living.paths) ::unlink(path.c_str());
+  if (last) callWithin(kLastCall, [&last, code = kSignalled + signal] { last(code); });
   ::_exit(kSignalled + signal);  // no destructors: other threads are in the middle of their work
 }
 
@@ -113,7 +132,7 @@ void writeWholeFile(const std::string& path, const std::string& bytes) {
   file.commit();
 }
 
-void removeTemporaryFilesOnSignal() {
+void removeTemporaryFilesOnSignal(std::function<void(int exitCode)> last) {
   // sigwait on a thread of its own, and not a handler: removing files needs locks, which handlers must not take.
   sigset_t signals;
   sigemptyset(&signals);
@@ -124,7 +143,7 @@ void removeTemporaryFilesOnSignal() {
   livingTemporaries();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   try {
-    std::thread(endOnSignal, signals).detach();
+    std::thread(endOnSignal, signals, std::move(last)).detach();
   } catch (const std::system_error& e) {
     throw MachineError(fmt::format("cannot start the thread that waits for signals: {}", e.what()));
   }

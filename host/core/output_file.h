@@ -1,5 +1,6 @@
 // An output file appears whole or not at all: written beside its place, then renamed.
 #pragma once
+#include <functional>
 #include <string>
 
 namespace mote {
@@ -30,9 +31,10 @@ class OutputFile {
 void writeWholeFile(const std::string& path, const std::string& bytes);
 
 /// From now on SIGINT, SIGTERM and SIGHUP remove the temporaries of every living OutputFile and end the process with
-/// 128 + the signal, as shells have it (130, 143, 129); what was committed before stays. Signals that the process was
-/// started to ignore (nohup) stay ignored. Call once, before any other thread starts: all threads must inherit the
-/// blocked signals. Throws MachineError where no thread can be started.
-void removeTemporaryFilesOnSignal();
+/// 128 + the signal, as shells have it (130, 143, 129); what was committed before stays. `last` is called just before
+/// the end with that exit code, on a thread of its own while others work on. Signals that the process was started to
+/// ignore (nohup) stay ignored. Call once, before any other thread starts: all threads must inherit the blocked
+/// signals. Throws MachineError where no thread can be started.
+void removeTemporaryFilesOnSignal(std::function<void(int exitCode)> last = {});
 
 }  // namespace mote

@@ -104,8 +104,7 @@ class Search {
     while (chosen.tries < kMostTries) {
       const double grid = cell_ > 0 ? gridCost(cell_) : INFINITY, detail = detailCostNow(grid);
       if (std::min(grid, detail) >= exactCost(met_)) return {};
-      const RaysDone once = chosen.tries == 0 ? done : RaysDone{};
-      std::vector<float> depths = grid <= detail ? byGrid(chosen, once) : byDetail(chosen, once);
+      std::vector<float> depths = grid <= detail ? byGrid(chosen, done) : byDetail(chosen, done);
       ++chosen.tries;
       chosen.error = probes_.measure(depths);
       if (chosen.error.upper <= error) return depths;

@@ -46,7 +46,7 @@ void storeTile(const Tile& tile, Image& image) {
 }  // namespace
 
 Image rasterize(std::span<const layout::SplatParticle> particles, std::span<const layout::uint> order,
-                const layout::SplatCamera& camera, bool withDepth) {
+                const layout::SplatCamera& camera, bool withDepth, const SplatsDone& done) {
   Image image(static_cast<int>(camera.imageSize.x), static_cast<int>(camera.imageSize.y), withDepth);
   MOTE_CHECK(std::max(image.width, image.height), <=, 65535);  // Splat's rectangle
   const Tiling tiling(image.width, image.height);
@@ -61,7 +61,7 @@ Image rasterize(std::span<const layout::SplatParticle> particles, std::span<cons
         splats[i] = makeSplat(particles[order[batch + i]], camera);
       }
     });
-    forEachTile(splats, tiling, bins, [&](std::size_t index, const std::uint32_t* items, std::size_t count) {
+    forEachTile(splats, tiling, bins, done, [&](std::size_t index, const std::uint32_t* items, std::size_t count) {
       thread_local Tile tile{};  // its padding is drawn on too: zero once, then whatever it holds
       tile.left = tiling.left(index), tile.top = tiling.top(index);
       tile.withDepth = withDepth;

@@ -74,7 +74,7 @@ void finishLayers(Image& image) {
 }
 
 Image rasterizeFull(const SplatSet& set, std::span<const layout::uint> order, std::span<const float> surfaces,
-                    SplatLayers layers) {
+                    SplatLayers layers, const SplatsDone& done) {
   const layout::SplatCamera& camera = set.camera();
   Image image(static_cast<int>(camera.imageSize.x), static_cast<int>(camera.imageSize.y), layers.depth);
   MOTE_CHECK(std::max(image.width, image.height), <=, 65535);  // the splats' rectangles
@@ -91,7 +91,7 @@ Image rasterizeFull(const SplatSet& set, std::span<const layout::uint> order, st
     parallelBlocks(splats.size(), 4096, [&](std::size_t from, std::size_t to) {
       for (std::size_t i = from; i < to; ++i) splats[i] = makeFullSplat(set, order[batch + i], layers.velocity);
     });
-    forEachTile(splats, tiling, bins, [&](std::size_t tile, const std::uint32_t* items, std::size_t count) {
+    forEachTile(splats, tiling, bins, done, [&](std::size_t tile, const std::uint32_t* items, std::size_t count) {
       for (std::size_t k = 0; k < count; ++k) drawSplat(set, splats[items[k]], tiling, tile, surfaces, image);
     });
   }

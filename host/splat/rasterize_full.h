@@ -6,6 +6,7 @@
 
 #include "host/image/image.h"
 #include "host/splat/splat_set.h"
+#include "host/splat/splats_done.h"
 
 namespace mote {
 
@@ -19,7 +20,7 @@ namespace mote {
 ///
 /// Does not depend on the number of threads. About 30 ns a splat and pixel of one core.
 Image rasterizeFull(const SplatSet& set, std::span<const layout::uint> order, std::span<const float> surfaces,
-                    SplatLayers layers);
+                    SplatLayers layers, const SplatsDone& done = {});
 
 /// What both rasterisers do to a finished picture: A as the mean of the colours, velocity per unit of opacity.
 void finishLayers(Image& image);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "host/image/image.h"
+#include "host/splat/splats_done.h"
 #include "shaders/glsl/layout/sort.h"
 #include "shaders/glsl/layout/splat.h"
 
@@ -65,6 +66,6 @@ std::vector<layout::uint> sortByDepth(std::span<const layout::SplatParticle> par
 /// bit for bit. Memory: the picture and at most 150 MB. A million splats of 4 pixels' radius take about half a second
 /// of one core with AVX-512, spread over all cores.
 Image rasterize(std::span<const layout::SplatParticle> particles, std::span<const layout::uint> order,
-                const layout::SplatCamera& camera, bool withDepth);
+                const layout::SplatCamera& camera, bool withDepth, const SplatsDone& done = {});
 
 }  // namespace mote

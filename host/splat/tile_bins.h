@@ -1,11 +1,13 @@
 // Splats sorted into the tiles of a picture: each tile is then drawn by one thread from its own list, in drawing order,
 // so that the number of threads cannot change the picture.
 #pragma once
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "host/core/bins.h"
+#include "host/splat/splats_done.h"
 #include "host/splat/tile_kernel.h"
 
 namespace mote {
@@ -43,9 +45,10 @@ struct Tiling {
 using Bins = Binned<std::uint32_t>;
 
 /// Bins all splats in runs of at most kMaxPairs pairs and calls drawTile(tile, items, count) for each tile that has
-/// some, tiles side by side, runs one after the other.
+/// some, tiles side by side, runs one after the other. `done`, where it is given, gets each tile's share of the splats.
 template <class S, class DrawTile>
-void forEachTile(const std::vector<S>& splats, const Tiling& tiling, Bins& bins, const DrawTile& drawTile) {
+void forEachTile(const std::vector<S>& splats, const Tiling& tiling, Bins& bins, const SplatsDone& done,
+                 const DrawTile& drawTile) {
   for (std::size_t begin = 0, end; begin < splats.size(); begin = end) {
     std::size_t pairs = 0;
     for (end = begin; end < splats.size(); ++end) {
@@ -57,10 +60,15 @@ void forEachTile(const std::vector<S>& splats, const Tiling& tiling, Bins& bins,
         tiling.forEach(splats[i], [&](std::size_t tile) { put(tile, static_cast<std::uint32_t>(i)); });
     };
     sortIntoBins(end - begin, tiling.count(), each, bins);
+    const double perPair =
+        static_cast<double>(end - begin) / static_cast<double>(std::max<std::size_t>(bins.items.size(), 1));
     tbb::parallel_for(std::size_t{0}, tiling.count(), [&](std::size_t tile) {
       const std::span<const std::uint32_t> items = bins.of(tile);
-      if (!items.empty()) drawTile(tile, items.data(), items.size());
+      if (items.empty()) return;
+      drawTile(tile, items.data(), items.size());
+      if (done) done(perPair * static_cast<double>(items.size()));
     });
+    if (done && bins.items.empty()) done(static_cast<double>(end - begin));
   }
 }
 

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <pty.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -24,7 +25,9 @@ struct ProcessOptions {
   std::optional<rlim_t> largestFile = {};               ///< RLIMIT_FSIZE [bytes]: a disk that is full
   std::string outputFile = {};                          ///< stdout goes there instead of into the result
   int signal = SIGINT;
-  std::function<bool()> signalWhen = {};  ///< asked every few milliseconds; `signal` is sent once it is true
+  std::function<bool()> signalWhen = {};  ///< asked every few milliseconds; `signal` is sent once it is true …
+  std::string signalAt = {};              ///< … or once stderr has this text
+  bool terminal = false;                  ///< stderr is a terminal of 160 columns
 };
 
 struct ProcessResult {
@@ -73,6 +76,15 @@ inline std::vector<std::string> environmentWith(const std::map<std::string, std:
   ::_exit(127);
 }
 
+/// A pipe, or a terminal of which the second is the program's end.
+inline bool openChannel(bool terminal, std::array<int, 2>& ends) {
+  if (!terminal) return ::pipe2(ends.data(), O_CLOEXEC) == 0;
+  const winsize size{.ws_row = 24, .ws_col = 160, .ws_xpixel = 0, .ws_ypixel = 0};
+  if (::openpty(&ends[0], &ends[1], nullptr, nullptr, &size) != 0) return false;
+  for (const int end : ends) ::fcntl(end, F_SETFD, FD_CLOEXEC);
+  return true;
+}
+
 }  // namespace detail
 
 /// `arguments[0]` is the program's path. A program that runs longer than two minutes is killed, and that is a failure.
@@ -81,8 +93,8 @@ inline ProcessResult runProcess(std::vector<std::string> arguments, const Proces
   std::vector<char*> argumentList = detail::pointers(arguments), environmentList = detail::pointers(environment);
   ProcessResult result;
   std::array<int, 2> out{}, err{};
-  if (::pipe2(out.data(), O_CLOEXEC) != 0 || ::pipe2(err.data(), O_CLOEXEC) != 0) {
-    ADD_FAILURE() << "no pipe";
+  if (!detail::openChannel(false, out) || !detail::openChannel(options.terminal, err)) {
+    ADD_FAILURE() << "no pipe, or no terminal";
     return result;
   }
   const pid_t child = ::fork();
@@ -92,7 +104,7 @@ inline ProcessResult runProcess(std::vector<std::string> arguments, const Proces
 
   std::array<pollfd, 2> open{pollfd{out[0], POLLIN, 0}, pollfd{err[0], POLLIN, 0}};
   std::array<std::string*, 2> texts{&result.out, &result.err};
-  bool signalled = !options.signalWhen;
+  bool signalled = !options.signalWhen && options.signalAt.empty();
   const auto begin = std::chrono::steady_clock::now();
   while (open[0].fd >= 0 || open[1].fd >= 0) {
     ::poll(open.data(), open.size(), signalled ? 1000 : 2);
@@ -101,9 +113,11 @@ inline ProcessResult runProcess(std::vector<std::string> arguments, const Proces
       char bytes[4096];
       const ssize_t got = ::read(open[i].fd, bytes, sizeof bytes);
       if (got > 0) texts[i]->append(bytes, static_cast<std::size_t>(got));
-      if (got == 0) ::close(open[i].fd), open[i].fd = -1;
+      if (got <= 0) ::close(open[i].fd), open[i].fd = -1;  // the end of a terminal is an error
     }
-    if (!signalled && options.signalWhen()) signalled = true, ::kill(child, options.signal);
+    if (!signalled &&
+        (options.signalWhen ? options.signalWhen() : result.err.find(options.signalAt) != std::string::npos))
+      signalled = true, ::kill(child, options.signal);
     if (std::chrono::steady_clock::now() - begin > std::chrono::minutes(2)) {
       ADD_FAILURE() << arguments[0] << " ran for more than two minutes";
       ::kill(child, SIGKILL);

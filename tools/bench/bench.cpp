@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "host/core/error.h"
-#include "host/core/log.h"
 #include "host/core/output_file.h"
 #include "host/core/parallel.h"
+#include "host/core/progress.h"
 #include "host/lighting/exact/beam_kernel.h"
 #include "tools/render.h"
 
@@ -165,7 +165,7 @@ Comparison Bench::checked(const Trial& trial) const {
 }
 
 void Bench::compareInTurn(const std::vector<Trial>& trials) {
-  Progress progress(trials.front().name, static_cast<double>(trials.size()) * (1 + options_.runs));
+  Progress progress(trials.front().name, static_cast<double>(trials.size()) * (1 + options_.runs), "runs");
   std::vector<Comparison> comparisons;
   for (const Trial& trial : trials) {
     comparisons.push_back(checked(trial));
