@@ -13,8 +13,8 @@
 #include "host/core/log_event.h"
 #include "host/core/parallel.h"
 #include "host/core/progress.h"
+#include "host/core/simd_targets.h"
 #include "host/core/timer.h"
-#include "host/lighting/exact/beam_kernel.h"
 #include "host/solids/surfaces.h"
 #include "host/splat/splat.h"
 

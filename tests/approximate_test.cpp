@@ -1,4 +1,5 @@
 // Light within an error: the promise on every kind of cloud, determinism, and no flicker.
+#include "host/core/simd_targets.h"
 #include "host/lighting/approximate.h"
 
 #include <gtest/gtest.h>
@@ -10,7 +11,6 @@
 
 #include "host/core/parallel.h"
 #include "host/core/random.h"
-#include "host/lighting/exact/beam_kernel.h"
 #include "host/lighting/medium.h"
 #include "host/particles/generate.h"
 #include "host/particles/particle_loader.h"

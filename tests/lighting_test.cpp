@@ -1,4 +1,5 @@
 // Exact lighting against the definition in double precision, and the promises about threads, instruction sets, cutoff.
+#include "host/core/simd_targets.h"
 #include "host/lighting/lighting.h"
 
 #include <gtest/gtest.h>

@@ -5,7 +5,7 @@
 
 #include "host/core/parallel.h"
 #include "host/core/random.h"
-#include "host/lighting/exact/beam_kernel.h"
+#include "host/core/simd_targets.h"
 #include "host/lighting/exact/beams.h"
 #include "host/lighting/irradiance.h"
 #include "host/lighting/lighting.h"

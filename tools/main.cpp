@@ -4,6 +4,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <new>
 #include <optional>
 #include <string_view>
@@ -15,6 +16,7 @@
 #include "host/core/log_event.h"
 #include "host/core/output_file.h"
 #include "host/core/parallel.h"
+#include "host/core/simd_targets.h"
 #include "host/core/timer.h"
 #include "host/scene/json_reader.h"
 #include "tools/command.h"
@@ -143,6 +145,7 @@ int run(int argc, char** argv, std::atomic<bool>& started) {
   std::optional<ThreadLimit> threads;
   app.parse_complete_callback([&] {  // runs before the subcommand's own callback
     setVerbosity(common.quiet ? Verbosity::Quiet : common.verbose ? Verbosity::Verbose : Verbosity::Normal);
+    if (const char* simd = std::getenv("MOTE_SIMD"); simd && *simd) limitSimdTargets("MOTE_SIMD", simd);
     threads.emplace(common.threads);
     started = true;
     logStart(app, common);

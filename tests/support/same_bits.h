@@ -5,7 +5,7 @@
 #include <string>
 
 #include "host/core/parallel.h"
-#include "host/lighting/exact/beam_kernel.h"
+#include "host/core/simd_targets.h"
 
 namespace mote {
 

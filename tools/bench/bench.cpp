@@ -10,7 +10,7 @@
 #include "host/core/output_file.h"
 #include "host/core/parallel.h"
 #include "host/core/progress.h"
-#include "host/lighting/exact/beam_kernel.h"
+#include "host/core/simd_targets.h"
 #include "tools/render.h"
 
 namespace mote {

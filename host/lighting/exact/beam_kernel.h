@@ -4,8 +4,6 @@
 #pragma once
 #include <algorithm>
 #include <limits>
-#include <string>
-#include <vector>
 
 #include "host/lighting/exact/beam.h"
 
@@ -42,11 +40,6 @@ struct BeamKernel {
 const BeamKernel& scalarBeamKernel();
 /// With the best instruction set of this machine, chosen at the first call (Google Highway).
 const BeamKernel& simdBeamKernel();
-
-/// Instruction sets that simdBeamKernel may use on this machine, best first.
-std::vector<std::string> simdTargets();
-/// Holds simdBeamKernel to one of them, "" frees it again; for tests and benchmarks. Throws InputError on another name.
-void useSimdTarget(const std::string& name);
 
 // What both ways share.
 

@@ -432,19 +432,5 @@ const BeamKernel& simdBeamKernel() {
   return kernel;
 }
 
-std::vector<std::string> simdTargets() {
-  std::vector<std::string> names;
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) names.emplace_back(hwy::TargetName(target));
-  return names;
-}
-
-void useSimdTarget(const std::string& name) {
-  hwy::SetSupportedTargetsForTest(0);  // all of the machine's
-  if (name.empty()) return;
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets())
-    if (name == hwy::TargetName(target)) return hwy::SetSupportedTargetsForTest(target);
-  throw InputError("SIMD target", "", "one of this machine's instruction sets", name);
-}
-
 }  // namespace mote
 #endif

@@ -7,8 +7,8 @@
 
 #include "host/core/error.h"
 #include "host/core/parallel.h"
+#include "host/core/simd_targets.h"
 #include "host/core/timer.h"
-#include "host/lighting/exact/beam_kernel.h"
 
 namespace mote {
 namespace {
