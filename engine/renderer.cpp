@@ -36,7 +36,7 @@ std::unique_ptr<Gpu> tryOpen(const DeviceOptions& options, bool needed, std::str
 
 /// `device`: "" where none is used, because of `why` where there is a reason.
 void logChoice(const Backends& chosen, const std::string& device, const std::string& why) {
-  const std::string host = fmt::format("{} threads, {}", threadCount(), simdTargets().front());
+  const std::string host = fmt::format("{} threads, {}", threadCount(), simdTargetInUse());
   std::string text = fmt::format("lighting and picture on the CPU ({}); Vulkan is not used", host);
   if (!why.empty()) text += ": " + why;
   if (chosen.anyGpu())

@@ -7,8 +7,10 @@
 namespace mote {
 
 /// Instruction sets, by Highway's names (AVX3 is AVX-512), that this machine has and the kernels are compiled for, best
-/// first; the last is the portable code. The first is the one in use.
+/// first; the last is the portable code.
 std::vector<std::string> simdTargets();
+/// The one that a kernel runs on that is called now: what Highway's dispatch comes to, not what it should.
+std::string simdTargetInUse();
 
 /// From now on the kernels use `name` or what is narrower, and simdTargets() lists no other. Throws InputError, naming
 /// `place` and those there are, for another name.

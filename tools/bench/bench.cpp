@@ -135,7 +135,7 @@ Bench::Bench(const std::string& name, const BenchOptions& options, const CommonO
     why = error.what();
   }
   fmt::print("mote {} bench {}: {} threads, {}; {} timed runs of A and B in turn after one that is not counted\n",
-             MOTE_VERSION, name, threadCount(), simdTargets().front(), options.runs);
+             MOTE_VERSION, name, threadCount(), simdTargetInUse(), options.runs);
   if (gpu_)
     fmt::print("device: {}\n", gpu_->device().name());
   else
@@ -205,7 +205,7 @@ std::string Bench::reportJson() const {
   for (const Comparison& comparison : comparisons_) runs.push_back(toJson(comparison));
   for (const Floor& floor : floors_) floors.push_back(toJson(floor));
   const Json root = {{"version", MOTE_VERSION},    {"device", gpu_ ? gpu_->device().name() : "none"},
-                     {"threads", threadCount()},   {"simd", simdTargets().front()},
+                     {"threads", threadCount()},   {"simd", simdTargetInUse()},
                      {"benchmark", name_},         {"runs", std::move(runs)},
                      {"floors", std::move(floors)}};
   return root.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
