@@ -4,6 +4,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
@@ -33,6 +35,13 @@ struct LivingTemporaries {
 LivingTemporaries& livingTemporaries() {
   static auto* const living = new LivingTemporaries;  // never destroyed: a signal may come while the process ends
   return *living;
+}
+
+/// True where the path may well be meant, and the machine does not let it be written: a disk that is full or read-only,
+/// a folder of somebody else's.
+bool isMachines(int error) {
+  constexpr std::array kMachines{EACCES, EPERM, EROFS, ENOSPC, EDQUOT, EIO, EMFILE, ENFILE, ENOMEM, ESTALE, ETIMEDOUT};
+  return std::find(kMachines.begin(), kMachines.end(), error) != kMachines.end();
 }
 
 constexpr int kSignalled = 128;  // and the signal's number: what shells make of it
@@ -90,7 +99,9 @@ OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
   if (handle < 0) {
     const int why = errno;
     living.paths.erase(listed);
-    throw InputError(fmt::format("{}: cannot write there: {}", path_, std::strerror(why)));
+    const std::string message = fmt::format("{}: cannot write there: {}", path_, std::strerror(why));
+    if (isMachines(why)) throw MachineError(message);
+    throw InputError(message);
   }
   ::close(handle);
 }
@@ -109,10 +120,12 @@ void OutputFile::commit() {
     throw MachineError(fmt::format("{}: cannot reopen what was written: {}", path_, std::strerror(errno)));
   const int synced = ::fsync(handle);
   const int why = errno;
+  struct stat written {};
+  ::fstat(handle, &written);
   ::close(handle);
   // Pipes and some network disks cannot sync; that is no lost data.
   if (synced != 0 && why != EINVAL && why != EROFS)
-    throw MachineError(fmt::format("{}: writing failed: {}", path_, std::strerror(why)));
+    throw MachineError(fmt::format("{}: writing {} bytes failed: {}", path_, written.st_size, std::strerror(why)));
   LivingTemporaries& living = livingTemporaries();
   const std::scoped_lock lock(living.mutex);
   if (::rename(temporary_.c_str(), path_.c_str()) != 0)
@@ -125,10 +138,11 @@ void writeWholeFile(const std::string& path, const std::string& bytes) {
   OutputFile file(path);
   std::FILE* stream = std::fopen(file.temporaryPath().c_str(), "wb");
   if (!stream) throw MachineError(fmt::format("{}: cannot open: {}", path, std::strerror(errno)));
-  const bool written = std::fwrite(bytes.data(), 1, bytes.size(), stream) == bytes.size();
-  const bool closed = std::fclose(stream) == 0;
-  if (!written || !closed)
-    throw MachineError(fmt::format("{}: writing {} bytes failed: {}", path, bytes.size(), std::strerror(errno)));
+  int error = 0;
+  if (std::fwrite(bytes.data(), 1, bytes.size(), stream) != bytes.size()) error = errno;
+  if (std::fclose(stream) != 0 && error == 0) error = errno;
+  if (error != 0)
+    throw MachineError(fmt::format("{}: writing {} bytes failed: {}", path, bytes.size(), std::strerror(error)));
   file.commit();
 }
 

@@ -9,7 +9,8 @@ namespace mote {
 /// the temporary is removed and whatever stood at the path before stays.
 class OutputFile {
  public:
-  /// Throws InputError when the folder is missing or not a folder, the path is a folder, or it cannot be written.
+  /// Throws InputError when the folder is missing or not a folder, the path is a folder or no name for a file, and
+  /// MachineError when it cannot be written: a folder or disk that is read-only or full.
   explicit OutputFile(std::string path);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
