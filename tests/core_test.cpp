@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <filesystem>
@@ -171,6 +173,38 @@ TEST_F(OutputFileTest, ReportsAFailedWriteAndLeavesNothing) {
   std::signal(SIGXFSZ, oldHandler);
   EXPECT_TRUE(contains(message, "writing 1000000 bytes failed: "));
   EXPECT_EQ(fileCount(), 0u);
+}
+
+TEST_F(OutputFileTest, OnlyWhatDeadProcessesLeftOfOnesOwnFilesIsStale) {
+  // A process that is killed while it writes two files, and this one, which lives.
+  const pid_t killed = ::fork();
+  if (killed == 0) {
+    const OutputFile mine(path("a.1.exr")), others(path("b.exr"));
+    write(mine.temporaryPath(), "half");
+    ::kill(::getpid(), SIGKILL);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(killed, &status, 0), killed);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  const OutputFile living(path("a.1.exr"));
+  // By its name of another machine; by its name of nothing that Mote writes.
+  const std::string own = fs::path(living.temporaryPath()).filename();
+  std::string foreign = own;
+  foreign.replace(foreign.find(".part") - 8, 8, "0123abcd");
+  for (const std::string& name : {foreign, std::string(".a.1.exr.swp"), std::string(".a.1.part.exr")})
+    write(path(name), "x");
+  ASSERT_EQ(fileCount(), 6u);
+
+  const auto mine = [](const std::string& name) { return name == "a.1.exr"; };
+  EXPECT_EQ(removeStaleTemporaries(folder_.string(), mine), 1u);
+  EXPECT_EQ(fileCount(), 5u);
+  EXPECT_TRUE(fs::exists(living.temporaryPath()));
+  EXPECT_TRUE(fs::exists(path(foreign))) << "its machine may be at work on it";
+  fs::last_write_time(path(foreign), fs::file_time_type::clock::now() - std::chrono::hours(25));
+  EXPECT_EQ(removeStaleTemporaries(folder_.string(), mine), 1u);
+  EXPECT_FALSE(fs::exists(path(foreign)));
+  EXPECT_EQ(removeStaleTemporaries(folder_.string(), [](const std::string&) { return true; }), 1u) << "b.exr's";
+  EXPECT_EQ(removeStaleTemporaries(path("none"), mine), 0u);
 }
 
 TEST_F(OutputFileTest, KeepsEveryByte) {

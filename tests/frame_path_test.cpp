@@ -42,6 +42,17 @@ TEST(FramePath, TakesPercentDAsOtherProgramsWriteIt) {
     EXPECT_THROW(framePath(name, 1), InputError) << name;
 }
 
+TEST(FramePath, KnowsItsOwnFrames) {
+  for (const int frame : {-7, 0, 12, 12345}) {
+    EXPECT_TRUE(isFrameOf("x#/a.####.exr", framePath("x#/a.####.exr", frame)));
+    EXPECT_TRUE(isFrameOf("a.%d.exr", framePath("a.%d.exr", frame)));
+  }
+  EXPECT_TRUE(isFrameOf("plain.exr", "plain.exr"));
+  for (const char* other : {"a.12.exr", "a.00012.exr", "a.0012.exr.exr", "b.0012.exr", "a.0012x.exr", "a..exr", "a.exr",
+                            "a.+012.exr", "a.99999999999.exr", ""})
+    EXPECT_FALSE(isFrameOf("a.####.exr", other)) << other;
+}
+
 TEST(FrameRange, ReadsASingleFrameARangeAndAStep) {
   const auto is = [](const char* text, int first, int last, int step) {
     const FrameRange range = parseFrameRange(text);

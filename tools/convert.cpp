@@ -9,12 +9,12 @@
 
 #include "host/core/error.h"
 #include "host/core/log.h"
-#include "host/core/output_file.h"
 #include "host/particles/conversion.h"
 #include "host/scene/frame_path.h"
 #include "host/scene/missing_file.h"
 #include "tools/command.h"
 #include "tools/conversion_report.h"
+#include "tools/outputs.h"
 
 namespace mote {
 namespace {
@@ -138,7 +138,10 @@ void checkFiles(const ConvertOptions& options, const FrameRange& frames) {
     if (const fs::path place = fs::canonical(output, ignored); places.contains(place))
       throw InputError(output, "", "a file that is none of the inputs", "one of them", "an input is never overwritten");
   }
-  const OutputFile probe(pathIn(options, options.files.back(), frames.first));
+  if (options.frames.empty())
+    prepareOutput(options.files.back());
+  else
+    prepareOutputs(options.files.back(), frames.first);
 }
 
 void convert(const ConvertOptions& options) {

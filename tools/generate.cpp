@@ -10,11 +10,11 @@
 
 #include "host/core/error.h"
 #include "host/core/log.h"
-#include "host/core/output_file.h"
 #include "host/core/timer.h"
 #include "host/particles/formats/prt_writer.h"
 #include "host/scene/frame_path.h"
 #include "tools/command.h"
+#include "tools/outputs.h"
 
 namespace mote {
 namespace {
@@ -58,7 +58,7 @@ void checkOutput(const std::string& pattern, const FrameRange& frames) {
   if (frames.first + frames.step <= frames.last && !hasFramePattern(pattern))
     throw InputError("--output", "", "a name with #### for the frame number, because there are several frames",
                      "\"" + pattern + "\"", "for example plume.####.prt");
-  const OutputFile probe(framePath(pattern, frames.first));
+  prepareOutputs(pattern, frames.first);
 }
 
 std::string uint32Bytes(std::initializer_list<std::uint32_t> values) {

@@ -3,11 +3,11 @@
 
 #include "engine/settling.h"
 #include "host/core/log.h"
-#include "host/core/output_file.h"
 #include "host/core/parallel.h"
 #include "host/core/progress.h"
 #include "host/particles/formats/prt_writer.h"
 #include "host/scene/frame_path.h"
+#include "tools/outputs.h"
 #include "tools/render.h"
 
 namespace mote {
@@ -60,7 +60,7 @@ void light(const LightOptions& options, const CommonOptions& common) {
   Scene scene = openScene(options.scene);
   const int number = options.frameGiven ? options.frame : scene.frames.first;
   const std::string path = framePath(options.output, number);
-  { const OutputFile probe(path); }  // before any work
+  prepareOutput(path);
   std::unique_ptr<Gpu> gpu;
   const Backends backends = chooseBackends(parseBackend("--lighting", options.lighting, scene.lighting.backend),
                                            Backend::Cpu, deviceOptions(common), gpu);

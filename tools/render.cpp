@@ -21,6 +21,7 @@
 #include "host/scene/frame_path.h"
 #include "host/scene/sequence.h"
 #include "tools/info.h"
+#include "tools/outputs.h"
 #include "tools/preflight.h"
 #include "tools/resume.h"
 #include "tools/scene_facts.h"
@@ -43,9 +44,9 @@ void checkOutputs(const RenderOptions& options, const Scene& scene) {
     if (several && !hasFramePattern(pattern))
       throw InputError(pattern, "", "#### in the name, since there are several frames", "the same name for all of them",
                        "frame.####.exr, for example");
-    OutputFile probe(framePath(pattern, scene.frames.first));
+    prepareOutputs(pattern, scene.frames.first);
   }
-  if (!options.stats.empty()) OutputFile probe(options.stats);
+  if (!options.stats.empty()) prepareOutput(options.stats);
 }
 
 /// The stages in the order of the work, those that there were.

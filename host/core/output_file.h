@@ -1,5 +1,6 @@
 // An output file appears whole or not at all: written beside its place, then renamed.
 #pragma once
+#include <cstddef>
 #include <functional>
 #include <string>
 
@@ -16,7 +17,8 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Same folder, name starting with '.', ending in the same extension, unique to this process and object.
+  /// Same folder, name starting with '.', ending in the same extension, unique to this process and object; locked
+  /// (flock) as long as it exists.
   const std::string& temporaryPath() const { return temporary_; }
   const std::string& path() const { return path_; }
 
@@ -24,9 +26,15 @@ class OutputFile {
   void commit();
 
  private:
+  bool create(const std::string& temporary);
   std::string path_, temporary_;
+  int lock_ = -1;
   bool committed_ = false;
 };
+
+/// Removes what killed processes left in a folder of the files whose names are `ours`: temporaries that nobody has
+/// locked and that this machine made, or another and not within a day. Returns how many.
+std::size_t removeStaleTemporaries(const std::string& folder, const std::function<bool(const std::string& name)>& ours);
 
 /// Writes `bytes` through an OutputFile; throws as it does, and MachineError ("disk full", with the byte count).
 void writeWholeFile(const std::string& path, const std::string& bytes);

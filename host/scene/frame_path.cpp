@@ -75,6 +75,15 @@ std::string framePath(std::string_view pattern, int frame) {
   return fmt::format("{}{:0{}}{}", pattern.substr(0, found->begin), frame, found->width, pattern.substr(found->end));
 }
 
+bool isFrameOf(std::string_view pattern, std::string_view path) {
+  if (!hasFramePattern(pattern)) return path == pattern;
+  const FramePatternParts parts = framePatternParts(pattern);
+  if (path.size() <= parts.head.size() + parts.tail.size() || !path.starts_with(parts.head)) return false;
+  std::string_view number = path.substr(parts.head.size());
+  const std::optional<int> frame = takeInteger(number);
+  return frame && framePath(pattern, *frame) == path;
+}
+
 FramePatternParts framePatternParts(std::string_view pattern) {
   const auto found = findPattern(pattern, nameBegin(pattern));
   if (!found) return {std::string(pattern), ""};

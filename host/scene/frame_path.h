@@ -19,6 +19,9 @@ bool hasFramePattern(std::string_view pattern);
 /// printf's %04d). A pattern without one comes back unchanged. Throws InputError when the file name has more than one.
 std::string framePath(std::string_view pattern, int frame);
 
+/// True where framePath(pattern, frame) is `path` for some frame.
+bool isFrameOf(std::string_view pattern, std::string_view path);
+
 /// What stands before the frame number, folder included, and after it; all of it before, where there is none.
 struct FramePatternParts {
   std::string head, tail;
