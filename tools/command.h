@@ -21,6 +21,9 @@ struct CommonOptions {
   bool quiet = false, verbose = false;
 };
 
+/// An environment variable that tests set (docs/architecture.md, "Faults"); "" where it is not.
+std::string testSetting(const char* name);
+
 // Each adds its subcommand with its flags; the callback runs the command and throws as the library does. The int that a
 // command reports through `exitCode` is 0, 1 where a comparison failed, or what the worst of several frames came to.
 void addRenderCommand(CLI::App& app, const CommonOptions& common, int& exitCode);

@@ -40,7 +40,7 @@ void printJson(const std::vector<DeviceReport>& reports) {
 
 void devices(bool json, const CommonOptions& common) {
   const Instance instance(common.validate);
-  const std::vector<DeviceReport> reports = listDevices(instance);
+  const std::vector<DeviceReport> reports = listDevices(instance, testSetting("MOTE_LIMITS"));
   if (reports.empty())
     throw MachineError("no Vulkan device; install mesa-vulkan-drivers, or work without: --lighting cpu --raster cpu");
   json ? printJson(reports) : printText(reports);

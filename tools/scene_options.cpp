@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <string_view>
 
 #include "host/core/error.h"
@@ -79,8 +80,16 @@ std::optional<std::uint64_t> parseMemoryLimit(const std::string& flag, const std
   throw InputError(flag, "", "bytes (1500000, 512M, 1.5G)", "\"" + text + "\"");
 }
 
+std::string testSetting(const char* name) {
+  const char* const value = std::getenv(name);
+  return value ? value : "";
+}
+
 DeviceOptions deviceOptions(const CommonOptions& common) {
-  return {.device = common.device, .validate = common.validate, .memory = parseDeviceMemory(common.deviceMemory)};
+  return {.device = common.device,
+          .validate = common.validate,
+          .memory = parseDeviceMemory(common.deviceMemory),
+          .limits = testSetting("MOTE_LIMITS")};
 }
 
 void requireNoValidationMessages(const Gpu* gpu) {

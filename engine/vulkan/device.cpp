@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <utility>
 
 #include "engine/vulkan/check.h"
 #include "engine/vulkan/physical_device.h"
@@ -26,17 +27,7 @@ QueueFamily graphicsAndCompute(VkPhysicalDevice device) {
   throw MachineError("the Vulkan device has no queue with graphics and compute");
 }
 
-/// What is used where there is, and done without elsewhere.
-struct OptionalFeatures {
-  VkBool32 shaderFloat64, largePoints;
-};
-OptionalFeatures optionalFeatures(VkPhysicalDevice physicalDevice) {
-  VkPhysicalDeviceFeatures features;
-  vkGetPhysicalDeviceFeatures(physicalDevice, &features);
-  return {features.shaderFloat64, features.largePoints};
-}
-
-VkDevice createLogicalDevice(VkPhysicalDevice physicalDevice, std::uint32_t queueFamily) {
+VkDevice createLogicalDevice(VkPhysicalDevice physicalDevice, const DeviceFacts& facts, std::uint32_t queueFamily) {
   auto v13 = structure<VkPhysicalDeviceVulkan13Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES);
   v13.dynamicRendering = v13.synchronization2 = v13.maintenance4 = VK_TRUE;
   auto v12 = structure<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
@@ -47,9 +38,9 @@ VkDevice createLogicalDevice(VkPhysicalDevice physicalDevice, std::uint32_t queu
   features.features.geometryShader = features.features.independentBlend = VK_TRUE;
   features.features.dualSrcBlend = VK_TRUE;
   features.features.fullDrawIndexUint32 = features.features.shaderInt64 = VK_TRUE;
-  const OptionalFeatures optional = optionalFeatures(physicalDevice);
-  features.features.shaderFloat64 = optional.shaderFloat64;
-  features.features.largePoints = optional.largePoints;
+  // These are used where they are there, and done without elsewhere.
+  features.features.shaderFloat64 = facts.features.shaderFloat64;
+  features.features.largePoints = facts.features.largePoints;
 
   const float priority = 1;
   auto queue = structure<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
@@ -95,40 +86,16 @@ VkImageCreateInfo imageInfo(std::uint32_t width, std::uint32_t height, VkFormat 
 
 }  // namespace
 
-Device::Device(VkPhysicalDevice physicalDevice, bool stageAlways, MemoryLimit limit, std::optional<std::uint8_t> fill)
-    : physicalDevice_(physicalDevice), stageAlways_(stageAlways), fill_(fill) {
-  auto buffers =
-      structure<VkPhysicalDeviceMaintenance4Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES);
-  auto allocations =
-      structure<VkPhysicalDeviceMaintenance3Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES);
-  auto subgroups = structure<VkPhysicalDeviceSubgroupProperties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES);
-  auto sizes = structure<VkPhysicalDeviceSubgroupSizeControlProperties>(
-      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_PROPERTIES);
-  allocations.pNext = &buffers;
-  buffers.pNext = &subgroups;
-  subgroups.pNext = &sizes;
-  auto properties = structure<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
-  properties.pNext = &allocations;
-  vkGetPhysicalDeviceProperties2(physicalDevice, &properties);
-  name_ = properties.properties.deviceName;
-  cpu_ = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
-  limits_ = properties.properties.limits;
-  const OptionalFeatures optional = optionalFeatures(physicalDevice);
-  float64_ = optional.shaderFloat64 != VK_FALSE;
-  mostPointSide_ = optional.largePoints != VK_FALSE ? limits_.pointSizeRange[1] : 1;
-  subgroupSize_ = subgroups.subgroupSize;
-  leastSubgroupSize_ = std::min(subgroups.subgroupSize, std::max(sizes.minSubgroupSize, 1u));
-  mostSubgroupSize_ = std::max(subgroups.subgroupSize, sizes.maxSubgroupSize);
-  maxBuffer_ = buffers.maxBufferSize;
-  maxAllocation_ = allocations.maxMemoryAllocationSize;
-  vkGetPhysicalDeviceMemoryProperties(physicalDevice, &memory_);
+Device::Device(VkPhysicalDevice physicalDevice, DeviceFacts facts, const DeviceSettings& settings)
+    : physicalDevice_(physicalDevice), facts_(std::move(facts)), settings_(settings) {
+  const MemoryLimit& limit = settings.memory;
   const auto share = static_cast<std::uint64_t>(limit.share * static_cast<double>(memoryBytes()));
   budget_.limit_ = std::min(limit.bytes > 0 ? limit.bytes : share, memoryBytes());
 
   const QueueFamily family = graphicsAndCompute(physicalDevice);
   queueFamily_ = family.index;
   timestampBits_ = family.timestampBits;
-  device_ = createLogicalDevice(physicalDevice, queueFamily_);
+  device_ = createLogicalDevice(physicalDevice, facts_, queueFamily_);
   vkGetDeviceQueue(device_, queueFamily_, 0, &queue_);
   auto pool = structure<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
   pool.flags = VK_COMMAND_POOL_CREATE_TRANSIENT_BIT;
@@ -143,30 +110,22 @@ Device::~Device() {
   vkDestroyDevice(device_, nullptr);
 }
 
-std::uint64_t Device::memoryBytes() const {
-  std::uint64_t largest = 0;
-  for (std::uint32_t i = 0; i < memory_.memoryHeapCount; ++i)
-    if (memory_.memoryHeaps[i].flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT)
-      largest = std::max<std::uint64_t>(largest, memory_.memoryHeaps[i].size);
-  return largest;
-}
-
-std::uint64_t Device::maxBufferBytes() const { return std::min({maxBuffer_, maxAllocation_, memoryBytes()}); }
+std::uint64_t Device::maxBufferBytes() const { return std::min({facts_.maxBufferSize, facts_.maxMemoryAllocationSize, memoryBytes()}); }
 
 std::uint32_t Device::memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags flags,
                                  VkMemoryPropertyFlags preferred) const {
   // Vulkan lists types with fewer properties first, so of two that match alike the first asks no more than needed.
-  std::uint32_t best = memory_.memoryTypeCount;
+  std::uint32_t best = facts_.memory.memoryTypeCount;
   int bestMatch = -1;
-  for (std::uint32_t i = 0; i < memory_.memoryTypeCount; ++i) {
-    const VkMemoryPropertyFlags has = memory_.memoryTypes[i].propertyFlags;
+  for (std::uint32_t i = 0; i < facts_.memory.memoryTypeCount; ++i) {
+    const VkMemoryPropertyFlags has = facts_.memory.memoryTypes[i].propertyFlags;
     if (!(typeBits & (1u << i)) || (has & flags) != flags) continue;
     const int match = std::popcount(has & preferred);
     if (match > bestMatch) best = i, bestMatch = match;
   }
-  if (best == memory_.memoryTypeCount)
+  if (best == facts_.memory.memoryTypeCount)
     throw MachineError(
-        fmt::format("{} has no memory type with the properties {:#x} among the types {:#x}", name_, flags, typeBits));
+        fmt::format("{} has no memory type with the properties {:#x} among the types {:#x}", name(), flags, typeBits));
   return best;
 }
 
@@ -176,12 +135,12 @@ std::uint32_t Device::memoryType(std::uint32_t typeBits, Memory memory) const {
 }
 
 bool Device::inBudget(std::uint32_t type) const {
-  return memory_.memoryHeaps[memory_.memoryTypes[type].heapIndex].flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT;
+  return facts_.memory.memoryHeaps[facts_.memory.memoryTypes[type].heapIndex].flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT;
 }
 
 bool Device::isMapped(std::uint32_t type, Memory memory) const {
-  const bool mappable = (memory_.memoryTypes[type].propertyFlags & kMappable) == kMappable;
-  return memory == Memory::Host || (mappable && !stageAlways_);
+  const bool mappable = (facts_.memory.memoryTypes[type].propertyFlags & kMappable) == kMappable;
+  return memory == Memory::Host || (mappable && !settings_.stageAlways);
 }
 
 std::uint64_t Device::bufferCost(VkDeviceSize bytes, Memory memory) const {
@@ -206,13 +165,13 @@ std::uint64_t Device::imageCost(std::uint32_t width, std::uint32_t height, VkFor
 
 DeviceMemory Device::allocate(const VkMemoryRequirements& needs, std::uint32_t type, VkMemoryAllocateFlags flags,
                               const char* what) const {
-  const std::uint32_t heap = memory_.memoryTypes[type].heapIndex;
-  const std::uint64_t heapBytes = memory_.memoryHeaps[heap].size;
+  const std::uint32_t heap = facts_.memory.memoryTypes[type].heapIndex;
+  const std::uint64_t heapBytes = facts_.memory.memoryHeaps[heap].size;
   const std::string numbers =
       fmt::format("{} bytes asked for {}, heap {} of {} has {} bytes, one allocation at most {}", needs.size, what,
-                  heap, name_, heapBytes, maxAllocation_);
+                  heap, name(), heapBytes, facts_.maxMemoryAllocationSize);
   // Asking for more than these is invalid use of Vulkan, so the answer that a driver might give is given here.
-  const bool tooLarge = needs.size > heapBytes || needs.size > maxAllocation_;
+  const bool tooLarge = needs.size > heapBytes || needs.size > facts_.maxMemoryAllocationSize;
   auto flagsInfo = structure<VkMemoryAllocateFlagsInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO);
   flagsInfo.flags = flags;
   auto info = structure<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
@@ -223,7 +182,7 @@ DeviceMemory Device::allocate(const VkMemoryRequirements& needs, std::uint32_t t
     throw MachineError(fmt::format(
         "{} bytes asked for {}, and {} of the {} that may be held on {} are taken; --device-memory sets that "
         "limit, heap {} has {} bytes",
-        needs.size, what, budget_.held(), budget_.limit(), name_, heap, heapBytes));
+        needs.size, what, budget_.held(), budget_.limit(), name(), heap, heapBytes));
   DeviceMemory memory;
   memory.memory_ = DeviceHandle<VkDeviceMemory, &vkFreeMemory>(device_);
   vkCheck(tooLarge ? VK_ERROR_OUT_OF_DEVICE_MEMORY : vkAllocateMemory(device_, &info, nullptr, memory.memory_.out()),
@@ -235,9 +194,9 @@ DeviceMemory Device::allocate(const VkMemoryRequirements& needs, std::uint32_t t
 }
 
 Buffer Device::createBuffer(VkDeviceSize bytes, Memory memory) const {
-  if (bytes > maxBuffer_)
+  if (bytes > facts_.maxBufferSize)
     throw MachineError(fmt::format("a buffer of {} bytes is beyond the maxBufferSize of {}, {} bytes; its heap has {}",
-                                   bytes, name_, maxBuffer_, memoryBytes()));
+                                   bytes, name(), facts_.maxBufferSize, memoryBytes()));
   Buffer buffer;
   buffer.buffer_ = DeviceHandle<VkBuffer, &vkDestroyBuffer>(device_);
   buffer.size_ = bytes;
@@ -255,7 +214,7 @@ Buffer Device::createBuffer(VkDeviceSize bytes, Memory memory) const {
   if (isMapped(type, memory))
     vkCheck(vkMapMemory(device_, buffer.memory_.get(), 0, VK_WHOLE_SIZE, 0, &buffer.data_), "vkMapMemory",
             fmt::format("{} bytes", bytes));
-  if (fill_ && buffer.data_) std::fill_n(static_cast<std::uint8_t*>(buffer.data_), bytes, *fill_);
+  if (settings_.fill && buffer.data_) std::fill_n(static_cast<std::uint8_t*>(buffer.data_), bytes, *settings_.fill);
   auto address = structure<VkBufferDeviceAddressInfo>(VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO);
   address.buffer = buffer.handle();
   buffer.address_ = vkGetBufferDeviceAddress(device_, &address);
@@ -275,10 +234,10 @@ TexelView Device::createTexelView(const Buffer& buffer, VkFormat format, std::ui
 }
 
 Image2D Device::createImage(std::uint32_t width, std::uint32_t height, VkFormat format) const {
-  const std::uint32_t limit = limits_.maxImageDimension2D;
+  const std::uint32_t limit = limits().maxImageDimension2D;
   if (width > limit || height > limit)
     throw MachineError(fmt::format("a picture of {} x {} pixels is beyond the maxImageDimension2D of {}, {}", width,
-                                   height, name_, limit));
+                                   height, name(), limit));
   Image2D image;
   image.image_ = DeviceHandle<VkImage, &vkDestroyImage>(device_);
   image.view_ = DeviceHandle<VkImageView, &vkDestroyImageView>(device_);
@@ -308,7 +267,7 @@ TimestampQueries Device::createTimestampQueries(std::uint32_t spans) const {
   TimestampQueries queries;
   queries.pool_ = DeviceHandle<VkQueryPool, &vkDestroyQueryPool>(device_);
   queries.capacity_ = spans;
-  queries.secondsPerTick_ = static_cast<double>(limits_.timestampPeriod) * 1e-9;
+  queries.secondsPerTick_ = static_cast<double>(limits().timestampPeriod) * 1e-9;
   queries.tickMask_ = timestampBits_ >= 64 ? ~0ull : (1ull << timestampBits_) - 1;
   auto info = structure<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
   info.queryType = VK_QUERY_TYPE_TIMESTAMP;

@@ -12,6 +12,7 @@
 #include "engine/vulkan/buffer.h"
 #include "engine/vulkan/command_buffer.h"
 #include "engine/vulkan/compute_pipeline.h"
+#include "engine/vulkan/device_facts.h"
 #include "engine/vulkan/graphics_pipeline.h"
 #include "engine/vulkan/image.h"
 #include "engine/vulkan/shader_module.h"
@@ -20,38 +21,43 @@
 
 namespace mote {
 
+struct DeviceSettings {
+  /// Keeps Memory::Device buffers unmapped even where they could be mapped: a CPU device then behaves as a discrete one.
+  bool stageAlways = false;
+  /// At most the heap: what buffers and pictures in device-local memory may take together.
+  MemoryLimit memory = {};
+  /// For tests: what every byte of a new buffer is set to, where it is mapped, as what nothing writes then shows.
+  std::optional<std::uint8_t> fill = {};
+};
+
 /// One queue with graphics and compute, one command pool; for one thread. Outlives all it made.
 class Device {
  public:
-  /// A device from chooseDevice, which has checked that nothing is missing. `stageAlways` keeps Memory::Device buffers
-  /// unmapped even where they could be mapped: it makes a CPU device behave as a discrete one does. `limit`, at most
-  /// the heap, is what buffers and pictures in device-local memory may take together. `fill`: what
-  /// every byte of a new buffer is set to, where it is mapped; for tests, as what nothing writes then shows.
-  explicit Device(VkPhysicalDevice physicalDevice, bool stageAlways = false, MemoryLimit limit = {},
-                  std::optional<std::uint8_t> fill = {});
+  /// A device from chooseDevice, which has checked that nothing is missing, and what it says of itself.
+  Device(VkPhysicalDevice physicalDevice, DeviceFacts facts, const DeviceSettings& settings = {});
   ~Device();
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
 
   VkDevice handle() const { return device_; }
-  const std::string& name() const { return name_; }
+  std::string name() const { return facts_.properties.deviceName; }
   /// A software device (lavapipe): many elements an invocation suit it, workgroup barriers do not.
-  bool isCpu() const { return cpu_; }
+  bool isCpu() const { return facts_.isCpu(); }
   /// Double precision in shaders: optional, what needs it does without.
-  bool hasFloat64() const { return float64_; }
+  bool hasFloat64() const { return facts_.features.shaderFloat64 != VK_FALSE; }
   /// Largest side of a point [pixels]; 1 where there is no choice.
-  float mostPointSide() const { return mostPointSide_; }
+  float mostPointSide() const { return facts_.features.largePoints ? limits().pointSizeRange[1] : 1; }
   /// Invocations a subgroup: what shaders usually get, and the least and most that a driver may choose.
-  std::uint32_t subgroupSize() const { return subgroupSize_; }
-  std::uint32_t leastSubgroupSize() const { return leastSubgroupSize_; }
-  std::uint32_t mostSubgroupSize() const { return mostSubgroupSize_; }
-  const VkPhysicalDeviceLimits& limits() const { return limits_; }
+  std::uint32_t subgroupSize() const { return facts_.subgroupSize; }
+  std::uint32_t leastSubgroupSize() const { return facts_.leastSubgroupSize; }
+  std::uint32_t mostSubgroupSize() const { return facts_.mostSubgroupSize; }
+  const VkPhysicalDeviceLimits& limits() const { return facts_.properties.limits; }
   /// Largest buffer that can be made [bytes]; a bigger array must be streamed in parts.
   std::uint64_t maxBufferBytes() const;
   /// Elements of the longest texel view.
-  std::uint64_t mostTexels() const { return limits_.maxTexelBufferElements; }
+  std::uint64_t mostTexels() const { return limits().maxTexelBufferElements; }
   /// Size of the device-local heap [bytes].
-  std::uint64_t memoryBytes() const;
+  std::uint64_t memoryBytes() const { return facts_.memoryBytes(); }
 
   /// Everything made here that lies in device-local memory, to the byte that the driver takes.
   const MemoryBudget& budget() const { return budget_; }
@@ -118,15 +124,8 @@ class Device {
                     const VkDescriptorSetLayout* set = nullptr) const;
 
   VkPhysicalDevice physicalDevice_;
-  bool stageAlways_;
-  std::optional<std::uint8_t> fill_;
-  std::string name_;
-  bool cpu_ = false, float64_ = false;
-  float mostPointSide_ = 1;
-  std::uint32_t subgroupSize_ = 0, leastSubgroupSize_ = 0, mostSubgroupSize_ = 0;
-  VkPhysicalDeviceLimits limits_{};
-  VkPhysicalDeviceMemoryProperties memory_{};
-  std::uint64_t maxAllocation_ = 0, maxBuffer_ = 0;
+  DeviceFacts facts_;
+  DeviceSettings settings_;
   mutable MemoryBudget budget_;
   std::uint32_t queueFamily_ = 0, timestampBits_ = 0;
   VkDevice device_ = VK_NULL_HANDLE;

@@ -31,7 +31,7 @@ void Device::submitAndWait(CommandBuffer commands) const {
   submit.pCommandBufferInfos = &buffer;
   vkCheck(vkQueueSubmit2(queue_, 1, &submit, fence.get()), "vkQueueSubmit2");
   const VkFence waited = fence.get();
-  vkCheck(vkWaitForFences(device_, 1, &waited, VK_TRUE, ~0ull), "vkWaitForFences", fmt::format("on {}", name_));
+  vkCheck(vkWaitForFences(device_, 1, &waited, VK_TRUE, ~0ull), "vkWaitForFences", fmt::format("on {}", name()));
 }
 
 void Device::run(const std::function<void(CommandBuffer&)>& record) const {

@@ -17,6 +17,7 @@ struct DeviceOptions {
   bool stageAlways = false;  // see Device
   MemoryLimit memory = {};
   std::optional<std::uint8_t> fill = {};  // see Device
+  std::string limits = {};                // for tests: what the device says instead, see readFacts
 };
 
 /// Move-only; whatever its device made must be destroyed before it.

@@ -5,8 +5,8 @@
 #include <cctype>
 
 #include "engine/vulkan/check.h"
+#include "engine/vulkan/device_facts.h"
 #include "engine/vulkan/instance.h"
-#include "engine/vulkan/structure.h"
 #include "host/core/error.h"
 
 namespace mote {
@@ -41,60 +41,36 @@ int score(const std::string& type) {
   return static_cast<int>(std::find(kBestFirst.begin(), kBestFirst.end(), type) - kBestFirst.begin());
 }
 
-std::uint64_t deviceMemory(VkPhysicalDevice device) {
-  VkPhysicalDeviceMemoryProperties memory;
-  vkGetPhysicalDeviceMemoryProperties(device, &memory);
-  std::uint64_t largest = 0;
-  for (std::uint32_t i = 0; i < memory.memoryHeapCount; ++i)
-    if (memory.memoryHeaps[i].flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT)
-      largest = std::max<std::uint64_t>(largest, memory.memoryHeaps[i].size);
-  return largest;
-}
-
-void needFeatures(VkPhysicalDevice device, std::vector<std::string>& missing) {
-  auto v13 = structure<VkPhysicalDeviceVulkan13Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES);
-  auto v12 = structure<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
-  auto features = structure<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
-  features.pNext = &v12;
-  v12.pNext = &v13;
-  vkGetPhysicalDeviceFeatures2(device, &features);
+void needFeatures(const DeviceFacts& facts, std::vector<std::string>& missing) {
   const auto need = [&](VkBool32 has, const char* name) {
     if (!has) missing.push_back(fmt::format("feature {}", name));
   };
-  need(features.features.geometryShader, "geometryShader");
-  need(features.features.independentBlend, "independentBlend");
-  need(features.features.dualSrcBlend, "dualSrcBlend");
-  need(features.features.fullDrawIndexUint32, "fullDrawIndexUint32");
-  need(features.features.shaderInt64, "shaderInt64");
-  need(v12.bufferDeviceAddress, "bufferDeviceAddress");
-  need(v12.scalarBlockLayout, "scalarBlockLayout");
-  need(v12.hostQueryReset, "hostQueryReset");
-  need(v13.dynamicRendering, "dynamicRendering");
-  need(v13.synchronization2, "synchronization2");
-  need(v13.maintenance4, "maintenance4");
+  need(facts.features.geometryShader, "geometryShader");
+  need(facts.features.independentBlend, "independentBlend");
+  need(facts.features.dualSrcBlend, "dualSrcBlend");
+  need(facts.features.fullDrawIndexUint32, "fullDrawIndexUint32");
+  need(facts.features.shaderInt64, "shaderInt64");
+  need(facts.features12.bufferDeviceAddress, "bufferDeviceAddress");
+  need(facts.features12.scalarBlockLayout, "scalarBlockLayout");
+  need(facts.features12.hostQueryReset, "hostQueryReset");
+  need(facts.features13.dynamicRendering, "dynamicRendering");
+  need(facts.features13.synchronization2, "synchronization2");
+  need(facts.features13.maintenance4, "maintenance4");
 }
 
-void needExtensions(VkPhysicalDevice device, std::vector<std::string>& missing) {
-  std::uint32_t count = 0;
-  vkCheck(vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr),
-          "vkEnumerateDeviceExtensionProperties");
-  std::vector<VkExtensionProperties> there(count);
-  vkCheck(vkEnumerateDeviceExtensionProperties(device, nullptr, &count, there.data()),
-          "vkEnumerateDeviceExtensionProperties");
+void needExtensions(const DeviceFacts& facts, std::vector<std::string>& missing) {
   for (const char* needed : kDeviceExtensions)
-    if (std::none_of(there.begin(), there.end(),
-                     [&](const VkExtensionProperties& e) { return std::string_view(e.extensionName) == needed; }))
+    if (std::find(facts.extensions.begin(), facts.extensions.end(), needed) == facts.extensions.end())
       missing.push_back(fmt::format("extension {}", needed));
 }
 
-void needSubgroups(VkPhysicalDevice device, std::vector<std::string>& missing) {
-  auto subgroups = structure<VkPhysicalDeviceSubgroupProperties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES);
-  auto properties = structure<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
-  properties.pNext = &subgroups;
-  vkGetPhysicalDeviceProperties2(device, &properties);
-  if (!(subgroups.supportedStages & VK_SHADER_STAGE_COMPUTE_BIT)) missing.push_back("subgroup operations in compute");
+void needSubgroups(const DeviceFacts& facts, std::vector<std::string>& missing) {
+  if (facts.subgroupOperations == 0) {
+    missing.push_back("subgroup operations in compute");
+    return;
+  }
   const auto need = [&](VkSubgroupFeatureFlagBits operations, const char* name) {
-    if (!(subgroups.supportedOperations & operations)) missing.push_back(fmt::format("subgroup operations: {}", name));
+    if (!(facts.subgroupOperations & operations)) missing.push_back(fmt::format("subgroup operations: {}", name));
   };
   need(VK_SUBGROUP_FEATURE_BASIC_BIT, "basic");
   need(VK_SUBGROUP_FEATURE_VOTE_BIT, "vote");
@@ -102,17 +78,14 @@ void needSubgroups(VkPhysicalDevice device, std::vector<std::string>& missing) {
   need(VK_SUBGROUP_FEATURE_ARITHMETIC_BIT, "arithmetic");
 }
 
-void needFormats(VkPhysicalDevice device, std::vector<std::string>& missing) {
-  const auto need = [&](VkFormat format, const char* name) {
+void needFormats(const DeviceFacts& facts, std::vector<std::string>& missing) {
+  const auto need = [&](VkFormatFeatureFlags has, const char* name) {
     constexpr VkFormatFeatureFlags kNeeded =
         VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT | VK_FORMAT_FEATURE_TRANSFER_SRC_BIT;
-    VkFormatProperties properties;
-    vkGetPhysicalDeviceFormatProperties(device, format, &properties);
-    if ((properties.optimalTilingFeatures & kNeeded) != kNeeded)
-      missing.push_back(fmt::format("blended colour attachments of format {}", name));
+    if ((has & kNeeded) != kNeeded) missing.push_back(fmt::format("blended colour attachments of format {}", name));
   };
-  need(VK_FORMAT_R32G32B32A32_SFLOAT, "R32G32B32A32_SFLOAT");
-  need(VK_FORMAT_R32_SFLOAT, "R32_SFLOAT");
+  need(facts.rgba32f, "R32G32B32A32_SFLOAT");
+  need(facts.r32f, "R32_SFLOAT");
 }
 
 void needQueue(VkPhysicalDevice device, std::vector<std::string>& missing) {
@@ -126,30 +99,26 @@ void needQueue(VkPhysicalDevice device, std::vector<std::string>& missing) {
   missing.push_back("a queue with graphics and compute");
 }
 
-DeviceReport report(VkPhysicalDevice device) {
-  VkPhysicalDeviceProperties properties;
-  vkGetPhysicalDeviceProperties(device, &properties);
+DeviceReport report(VkPhysicalDevice device, const std::string& overrides) {
+  const DeviceFacts facts = readFacts(device, overrides);
+  const VkPhysicalDeviceProperties& properties = facts.properties;
   DeviceReport r;
   r.name = properties.deviceName;
   r.type = typeName(properties.deviceType);
   r.apiVersion = versionText(properties.apiVersion);
-  r.memory = deviceMemory(device);
-  if (properties.apiVersion < VK_API_VERSION_1_3) {  // what follows may not even be asked of an older device
+  r.memory = facts.memoryBytes();
+  if (properties.apiVersion < VK_API_VERSION_1_3) {
     r.driver = versionText(properties.driverVersion);
     r.missing.push_back(fmt::format("Vulkan version: 1.3 needed, {} there", r.apiVersion));
     return r;
   }
-  auto driver = structure<VkPhysicalDeviceDriverProperties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES);
-  auto more = structure<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
-  more.pNext = &driver;
-  vkGetPhysicalDeviceProperties2(device, &more);
-  r.driver = fmt::format("{} {}", driver.driverName, driver.driverInfo);
-  needFeatures(device, r.missing);
-  needExtensions(device, r.missing);
+  r.driver = facts.driver;
+  needFeatures(facts, r.missing);
+  needExtensions(facts, r.missing);
   const std::vector<std::string> limits = missingLimits(properties.limits);
   r.missing.insert(r.missing.end(), limits.begin(), limits.end());
-  needSubgroups(device, r.missing);
-  needFormats(device, r.missing);
+  needSubgroups(facts, r.missing);
+  needFormats(facts, r.missing);
   needQueue(device, r.missing);
   return r;
 }
@@ -204,20 +173,20 @@ std::vector<std::string> missingLimits(const VkPhysicalDeviceLimits& limits) {
   return missing;
 }
 
-std::vector<DeviceReport> listDevices(const Instance& instance) {
+std::vector<DeviceReport> listDevices(const Instance& instance, const std::string& overrides) {
   std::vector<DeviceReport> reports;
-  for (VkPhysicalDevice device : enumerate(instance)) reports.push_back(report(device));
+  for (VkPhysicalDevice device : enumerate(instance)) reports.push_back(report(device, overrides));
   return reports;
 }
 
 std::vector<DeviceReport> listDevices() { return listDevices(Instance(false)); }
 
-VkPhysicalDevice chooseDevice(const Instance& instance, const std::string& wanted) {
+VkPhysicalDevice chooseDevice(const Instance& instance, const std::string& wanted, const std::string& overrides) {
   const std::vector<VkPhysicalDevice> devices = enumerate(instance);
   if (devices.empty())
     throw MachineError("no Vulkan device; install mesa-vulkan-drivers or use --lighting cpu --raster cpu");
   std::vector<DeviceReport> reports;
-  for (VkPhysicalDevice device : devices) reports.push_back(report(device));
+  for (VkPhysicalDevice device : devices) reports.push_back(report(device, overrides));
   const std::size_t index = indexOf(reports, wanted);
   if (!reports[index].missing.empty())
     throw MachineError(

@@ -28,8 +28,8 @@ struct DeviceReport {
 std::vector<std::string> missingLimits(const VkPhysicalDeviceLimits& limits);
 
 /// All devices in the loader's order: the number that `--device` takes is the index. Throws MachineError when a call
-/// fails; an empty list is no error.
-std::vector<DeviceReport> listDevices(const Instance& instance);
+/// fails; an empty list is no error. `overrides` as readFacts takes them.
+std::vector<DeviceReport> listDevices(const Instance& instance, const std::string& overrides = {});
 
 /// As above with an instance of its own. Throws MachineError when there is no loader or driver.
 std::vector<DeviceReport> listDevices();
@@ -38,6 +38,6 @@ std::vector<DeviceReport> listDevices();
 /// (discrete, integrated, virtual, CPU; in that order). Of several that fit a name the first is taken. Throws
 /// InputError with the list of devices when none fits, MachineError when there is no device, or when what was chosen
 /// lacks something, with the list of it.
-VkPhysicalDevice chooseDevice(const Instance& instance, const std::string& wanted);
+VkPhysicalDevice chooseDevice(const Instance& instance, const std::string& wanted, const std::string& overrides = {});
 
 }  // namespace mote
