@@ -107,7 +107,7 @@ SplatLayers pictureLayers(const Frame& frame, const Scene& scene) {
           .colorAlpha = !frame.extinction.grey()};
 }
 
-Image makePicture(const Frame& frame, const Scene& scene, LitParticles lit, const Surfaces& surfaces,
+Image makePicture(const Frame& frame, const Scene& scene, const LitParticles& lit, const Surfaces& surfaces,
                   std::vector<SurfaceLight> surfaceLights, Rasterizer& rasterizer, FrameStats& stats) {
   std::vector<ImageLayer> shadows;
   std::vector<SurfaceRadiance> byLight;
@@ -135,7 +135,6 @@ Image makePicture(const Frame& frame, const Scene& scene, LitParticles lit, cons
   }
   for (std::size_t l = 0; l < frame.lights.size(); ++l) {
     rasterizer.relight(relit(rasterizer.set(), frame, scene, lit.byLight[l]), false);
-    lit.byLight[l] = {};
     addColorLayers(composer.compose(byLight[l], plain), "light." + frame.lightNames[l], picture);
   }
   return picture;

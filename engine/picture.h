@@ -23,10 +23,10 @@ SplatLayers pictureLayers(const Frame& frame, const Scene& scene);
 ///   shadow.<light>   T · S at the surfaces, weighted by coverage; 1 where there is none. Holdouts have it as well
 ///   light.<name>.*   the picture by one light alone; `emission.*` what the particles give out. Their sum is the
 ///   picture
-/// `lit` is taken apart on the way. `surfaceLights` are the lights on the surfaces, one a light of the frame, none
+/// `surfaceLights` are the lights on the surfaces, one a light of the frame, none
 /// where there are no surfaces. The seconds of laying surfaces and medium over each other go to stats' "solids"; the
 /// rasteriser counts its own.
-Image makePicture(const Frame& frame, const Scene& scene, LitParticles lit, const Surfaces& surfaces,
+Image makePicture(const Frame& frame, const Scene& scene, const LitParticles& lit, const Surfaces& surfaces,
                   std::vector<SurfaceLight> surfaceLights, Rasterizer& rasterizer, FrameStats& stats);
 
 }  // namespace mote

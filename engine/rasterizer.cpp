@@ -30,7 +30,7 @@ bool fast(const SplatSet& set, std::span<const float> surfaces, SplatLayers laye
 
 class HostRasterizer : public Rasterizer {
  public:
-  HostRasterizer(SplatSet set, float keyScale, FrameStats& stats) : set_(std::move(set)), stats_(stats) {
+  HostRasterizer(SplatSet& set, float keyScale, FrameStats& stats) : set_(set), stats_(stats) {
     Timer timer;
     const Progress progress("sort");
     order_ = sortByDepth(set_.particles, set_.camera(), keyScale);
@@ -56,7 +56,7 @@ class HostRasterizer : public Rasterizer {
   const std::vector<layout::uint>& order() const override { return order_; }
 
  private:
-  SplatSet set_;
+  SplatSet& set_;
   FrameStats& stats_;
   std::vector<layout::uint> order_;
 };
@@ -65,9 +65,9 @@ class HostRasterizer : public Rasterizer {
 /// there, and every picture is drawn in parts from back to front: the same order, and the same blending.
 class DeviceRasterizer : public Rasterizer {
  public:
-  DeviceRasterizer(const Device& device, SplatSet set, float keyScale, FrameStats& stats)
+  DeviceRasterizer(const Device& device, SplatSet& set, float keyScale, FrameStats& stats)
       : device_(device),
-        set_(std::move(set)),
+        set_(set),
         stats_(stats),
         keyScale_(keyScale),
         count_(static_cast<std::uint32_t>(set_.particles.size())) {
@@ -218,7 +218,7 @@ class DeviceRasterizer : public Rasterizer {
   }
 
   const Device& device_;
-  SplatSet set_;
+  SplatSet& set_;
   FrameStats& stats_;
   float keyScale_;
   std::uint32_t count_;
@@ -230,12 +230,12 @@ class DeviceRasterizer : public Rasterizer {
 
 }  // namespace
 
-std::unique_ptr<Rasterizer> hostRasterizer(SplatSet set, float keyScale, FrameStats& stats) {
-  return std::make_unique<HostRasterizer>(std::move(set), keyScale, stats);
+std::unique_ptr<Rasterizer> hostRasterizer(SplatSet& set, float keyScale, FrameStats& stats) {
+  return std::make_unique<HostRasterizer>(set, keyScale, stats);
 }
 
-std::unique_ptr<Rasterizer> deviceRasterizer(const Device& device, SplatSet set, float keyScale, FrameStats& stats) {
-  return std::make_unique<DeviceRasterizer>(device, std::move(set), keyScale, stats);
+std::unique_ptr<Rasterizer> deviceRasterizer(const Device& device, SplatSet& set, float keyScale, FrameStats& stats) {
+  return std::make_unique<DeviceRasterizer>(device, set, keyScale, stats);
 }
 
 }  // namespace mote

@@ -26,8 +26,8 @@ class Rasterizer {
   virtual const std::vector<layout::uint>& order() const = 0;
 };
 
-/// `keyScale`: depthKeyScale of the particles. `stats` must outlive the rasteriser.
-std::unique_ptr<Rasterizer> hostRasterizer(SplatSet set, float keyScale, FrameStats& stats);
-std::unique_ptr<Rasterizer> deviceRasterizer(const Device& device, SplatSet set, float keyScale, FrameStats& stats);
+/// `keyScale`: depthKeyScale of the particles. `set`, which relight changes, and `stats` must outlive the rasteriser.
+std::unique_ptr<Rasterizer> hostRasterizer(SplatSet& set, float keyScale, FrameStats& stats);
+std::unique_ptr<Rasterizer> deviceRasterizer(const Device& device, SplatSet& set, float keyScale, FrameStats& stats);
 
 }  // namespace mote

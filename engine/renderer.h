@@ -1,8 +1,12 @@
 // One frame of a scene as a picture: lighting and rasterising on the host or on a Vulkan device.
 #pragma once
+#include <functional>
 #include <memory>
+#include <optional>
 
 #include "engine/lighting.h"
+#include "engine/recovery.h"
+#include "engine/surface_light.h"
 #include "engine/vulkan/gpu.h"
 #include "host/image/image.h"
 
@@ -11,6 +15,8 @@ namespace mote {
 /// Where the two heavy stages run; never Auto.
 struct Backends {
   bool gpuLighting = false, gpuRaster = false;
+  /// It was Auto: where the device fails, the CPU may take over.
+  bool autoLighting = false, autoRaster = false;
   bool anyGpu() const { return gpuLighting || gpuRaster; }
 };
 
@@ -30,8 +36,12 @@ struct DrawingSample {
 
 class Renderer {
  public:
-  /// `gpu` may be null where `backends` names no device; it must outlive the renderer.
+  /// `gpu` may be null where `backends` names no device; it must outlive the renderer. Nothing else that its device
+  /// made may be there while the renderer works: where the device is lost, it is opened anew.
   Renderer(Backends backends, Gpu* gpu);
+
+  /// Where the work is done now: on the CPU, once a device has failed beyond recovery (recovery.h) and it may.
+  Backends backends() const { return backends_; }
 
   /// Lights the particles; adds seconds["lighting"] and, on the device, deviceSeconds["lighting"] and deviceBytes.
   /// Where the device's budget is too small for the tree, it is passed in parts, and draw() sorts and splats in parts.
@@ -49,8 +59,15 @@ class Renderer {
   DrawingSample drawingSample(const Frame& frame, const Scene& scene);
 
  private:
+  using Work = std::function<void()>;
+  std::vector<SurfaceLight> lightOn(const Surfaces& surfaces, const Frame& frame, const Scene& scene,
+                                    FrameStats& stats);
+  void step(int frame, const std::string& name, bool Backends::*onDevice, bool Backends::*mayLeave, FrameStats& stats,
+            std::string& place, const Work& device, const Work& host);
+
   Backends backends_;
   Gpu* gpu_;
+  std::optional<Recovery> recovery_;
 };
 
 }  // namespace mote

@@ -46,6 +46,9 @@ Json reproducible(const FrameStats& frame) {
   for (const FrameInput& input : frame.inputs) inputs.push_back({{"file", input.file}, {"sha256", input.sha256}});
   return {
       {"frame", frame.frame},
+      {"lighting", frame.lighting},
+      {"raster", frame.raster},
+      {"settled_by", frame.settledBy ? Json(*frame.settledBy) : Json(nullptr)},
       {"particles", frame.particles},
       {"in_octree", frame.inOctree},
       {"drawn", frame.drawn},
@@ -86,17 +89,14 @@ std::string statsJson(const RunStats& run) {
   Json failed = Json::array();
   for (const FailedFrame& frame : run.failed) failed.push_back({{"frame", frame.frame}, {"error", frame.error}});
   const Json root = {{"version", MOTE_VERSION},     {"device", run.device},   {"lighting", run.lighting},
-                     {"raster", run.raster},        {"threads", run.threads}, {"settled_by", run.settledBy ? Json(*run.settledBy) : Json(nullptr)}, {"frames", std::move(frames)},
+                     {"raster", run.raster},        {"threads", run.threads}, {"frames", std::move(frames)},
                      {"failed", std::move(failed)}, {"skipped", run.skipped}};
   return root.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-std::string reproducibleStatsJson(const RunStats& run, const FrameStats& frame) {
+std::string reproducibleStatsJson(const FrameStats& frame) {
   Json root = reproducible(frame);
   root["version"] = MOTE_VERSION;
-  root["lighting"] = run.lighting;
-  root["raster"] = run.raster;
-  root["settled_by"] = run.settledBy ? Json(*run.settledBy) : Json(nullptr);
   return root.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

@@ -23,6 +23,9 @@ struct LightMethod {
 
 struct FrameStats {
   int frame = 1;
+  /// Where it was made: "cpu" or "gpu"; "gpu, cpu" where the device failed between particles and solids (recovery.h).
+  std::string lighting, raster;
+  std::optional<int> settledBy;  ///< the frame that settled what the scene leaves open; none: nothing was open
   std::size_t particles = 0, inOctree = 0, lights = 0;
   std::size_t drawn = 0;  ///< particles in view: sorted and splatted
   /// Wall clock: load (particles, meshes, sprites, their sums; may have gone on while the frame before was drawn, and
@@ -48,9 +51,9 @@ struct FailedFrame {
 
 struct RunStats {
   std::string device = "none";   ///< Vulkan device in use
-  std::string lighting, raster;  ///< "cpu" or "gpu"
+  std::string lighting, raster;  ///< "cpu" or "gpu", as it was chosen before the first frame
   unsigned threads = 0;
-  std::optional<int> settledBy;    ///< the frame that settled what the scene leaves open; none: nothing was
+  std::optional<int> settledBy;    ///< the frame that settled what the scene leaves open; none: none did yet
   std::string settings;            ///< SHA-256 of everything but the input files that a picture may depend on
   std::vector<FrameStats> frames;  ///< that were written
   std::vector<FailedFrame> failed;
@@ -65,6 +68,6 @@ std::string statsJson(const RunStats& run);
 
 /// One frame without what differs from run to run (seconds, memory): for EXR headers, so that equal input gives equal
 /// bytes.
-std::string reproducibleStatsJson(const RunStats& run, const FrameStats& frame);
+std::string reproducibleStatsJson(const FrameStats& frame);
 
 }  // namespace mote

@@ -212,6 +212,7 @@ class Batch {
     const bool open = leavesOpen(scene_);
     const Frame frame = prepareFrame(scene_, std::move(loaded), stats);
     if (open) run_.settledBy = number;
+    stats.settledBy = run_.settledBy;
     settled_ = true;
     if (next && ahead_) loader_.prefetch(*next);
     const Image image = renderer_.draw(frame, scene_, renderer_.light(frame, lightWanted(scene_), stats), stats);

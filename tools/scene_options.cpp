@@ -89,7 +89,8 @@ DeviceOptions deviceOptions(const CommonOptions& common) {
   return {.device = common.device,
           .validate = common.validate,
           .memory = parseDeviceMemory(common.deviceMemory),
-          .limits = testSetting("MOTE_LIMITS")};
+          .limits = testSetting("MOTE_LIMITS"),
+          .faults = testSetting("MOTE_FAULTS")};
 }
 
 void requireNoValidationMessages(const Gpu* gpu) {
@@ -111,7 +112,7 @@ void writeFrameExr(const std::string& path, const Image& image, const Frame& fra
   options.framesPerSecond = scene.frames.fps;
   options.frame = frame.number;
   options.pixelAspectRatio = scene.output.pixelAspect;
-  options.strings = {{"mote:version", MOTE_VERSION}, {"mote:stats", reproducibleStatsJson(run, stats)}};
+  options.strings = {{"mote:version", MOTE_VERSION}, {"mote:stats", reproducibleStatsJson(stats)}};
   if (!run.settings.empty()) options.strings["mote:settings"] = run.settings;
   if (const dvec3& o = stats.origin; o != dvec3(0))  // what the matrices' world begins at
     options.strings["mote:origin"] = fmt::format("{} {} {}", o.x, o.y, o.z);

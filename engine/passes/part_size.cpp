@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "host/core/error.h"
+#include "engine/vulkan/check.h"
 
 namespace mote {
 
@@ -23,7 +23,8 @@ std::uint64_t partThatFits(const Device& device, std::uint64_t count, std::uint6
   if (arraysFit(device, sizes(count), reserved)) return count;
   std::uint64_t fits = std::min(least, count), tooMany = count;
   if (!arraysFit(device, sizes(fits), reserved))
-    throw MachineError(
+    throw DeviceError(
+        DeviceFault::Refused,
         fmt::format("{} need {} bytes of memory on {} even in parts, and {} of the {} that may be held there are taken "
                     "(its heap has "
                     "{}); let --device-memory be more, or work with --lighting cpu --raster cpu",

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "host/core/error.h"
+#include "engine/vulkan/check.h"
 
 namespace mote {
 
@@ -12,10 +12,10 @@ void requirePictureFits(const Device& device, std::uint32_t width, std::uint32_t
       std::min({limits.maxImageDimension2D, limits.maxFramebufferWidth, limits.maxFramebufferHeight,
                 limits.maxViewportDimensions[0], limits.maxViewportDimensions[1]});
   if (width > most || height > most)
-    throw MachineError(
-        fmt::format("a picture of {} × {} pixels is too large for {}, which draws at most {} × {}; "
-                    "use a smaller picture or --raster cpu",
-                    width, height, device.name(), most, most));
+    throw DeviceError(DeviceFault::Refused,
+                      fmt::format("a picture of {} × {} pixels is too large for {}, which draws at most {} × {}; "
+                                  "use a smaller picture or --raster cpu",
+                                  width, height, device.name(), most, most));
 }
 
 }  // namespace mote

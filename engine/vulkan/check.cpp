@@ -1,7 +1,5 @@
 #include "engine/vulkan/check.h"
 
-#include "host/core/error.h"
-
 namespace mote {
 
 std::string resultName(VkResult result) {
@@ -34,11 +32,24 @@ std::string resultName(VkResult result) {
   }
 }
 
-void vkCheck(VkResult result, std::string_view call, std::string_view detail) {
+namespace {
+
+DeviceFault faultOf(VkResult result) {
+  switch (result) {
+    case VK_ERROR_DEVICE_LOST: return DeviceFault::Lost;
+    case VK_ERROR_OUT_OF_DEVICE_MEMORY:
+    case VK_ERROR_MEMORY_MAP_FAILED: return DeviceFault::Memory;
+    default: return DeviceFault::Refused;
+  }
+}
+
+}  // namespace
+
+void vkCheck(VkResult result, std::string_view call, std::string_view detail, std::uint64_t bytes) {
   if (result == VK_SUCCESS) return;
   std::string message = fmt::format("{} failed: {}", call, resultName(result));
   if (!detail.empty()) message += fmt::format(" ({})", detail);
-  throw MachineError(message);
+  throw DeviceError(faultOf(result), message, bytes);
 }
 
 }  // namespace mote

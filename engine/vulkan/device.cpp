@@ -95,6 +95,7 @@ Device::Device(VkPhysicalDevice physicalDevice, DeviceFacts facts, const DeviceS
   const QueueFamily family = graphicsAndCompute(physicalDevice);
   queueFamily_ = family.index;
   timestampBits_ = family.timestampBits;
+  vkCheck(fault(DeviceCall::Open), "vkCreateDevice");
   device_ = createLogicalDevice(physicalDevice, facts_, queueFamily_);
   vkGetDeviceQueue(device_, queueFamily_, 0, &queue_);
   auto pool = structure<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
@@ -110,7 +111,16 @@ Device::~Device() {
   vkDestroyDevice(device_, nullptr);
 }
 
-std::uint64_t Device::maxBufferBytes() const { return std::min({facts_.maxBufferSize, facts_.maxMemoryAllocationSize, memoryBytes()}); }
+VkResult Device::fault(DeviceCall call) const {
+  if (lost_) return VK_ERROR_DEVICE_LOST;  // as a real one would
+  const VkResult result = settings_.faults ? settings_.faults->next(call) : VK_SUCCESS;
+  lost_ = result == VK_ERROR_DEVICE_LOST;
+  return result;
+}
+
+std::uint64_t Device::maxBufferBytes() const {
+  return std::min({facts_.maxBufferSize, facts_.maxMemoryAllocationSize, memoryBytes()});
+}
 
 std::uint32_t Device::memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags flags,
                                  VkMemoryPropertyFlags preferred) const {
@@ -171,22 +181,25 @@ DeviceMemory Device::allocate(const VkMemoryRequirements& needs, std::uint32_t t
       fmt::format("{} bytes asked for {}, heap {} of {} has {} bytes, one allocation at most {}", needs.size, what,
                   heap, name(), heapBytes, facts_.maxMemoryAllocationSize);
   // Asking for more than these is invalid use of Vulkan, so the answer that a driver might give is given here.
-  const bool tooLarge = needs.size > heapBytes || needs.size > facts_.maxMemoryAllocationSize;
+  if (needs.size > heapBytes || needs.size > facts_.maxMemoryAllocationSize)
+    throw DeviceError(DeviceFault::Refused, fmt::format("vkAllocateMemory would fail: {}", numbers));
   auto flagsInfo = structure<VkMemoryAllocateFlagsInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO);
   flagsInfo.flags = flags;
   auto info = structure<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
   info.pNext = &flagsInfo;
   info.allocationSize = needs.size;
   info.memoryTypeIndex = type;
-  if (!tooLarge && inBudget(type) && needs.size > budget_.room())
-    throw MachineError(fmt::format(
-        "{} bytes asked for {}, and {} of the {} that may be held on {} are taken; --device-memory sets that "
-        "limit, heap {} has {} bytes",
-        needs.size, what, budget_.held(), budget_.limit(), name(), heap, heapBytes));
+  if (inBudget(type) && needs.size > budget_.room())
+    throw DeviceError(
+        DeviceFault::Refused,
+        fmt::format("{} bytes asked for {}, and {} of the {} that may be held on {} are taken; --device-memory sets "
+                    "that limit, heap {} has {} bytes",
+                    needs.size, what, budget_.held(), budget_.limit(), name(), heap, heapBytes));
   DeviceMemory memory;
   memory.memory_ = DeviceHandle<VkDeviceMemory, &vkFreeMemory>(device_);
-  vkCheck(tooLarge ? VK_ERROR_OUT_OF_DEVICE_MEMORY : vkAllocateMemory(device_, &info, nullptr, memory.memory_.out()),
-          "vkAllocateMemory", numbers);
+  VkResult result = fault(DeviceCall::Allocate);
+  if (result == VK_SUCCESS) result = vkAllocateMemory(device_, &info, nullptr, memory.memory_.out());
+  vkCheck(result, "vkAllocateMemory", numbers, needs.size);
   if (!inBudget(type)) return memory;
   memory.budget_ = &budget_, memory.bytes_ = needs.size;
   budget_.take(needs.size);
@@ -195,8 +208,9 @@ DeviceMemory Device::allocate(const VkMemoryRequirements& needs, std::uint32_t t
 
 Buffer Device::createBuffer(VkDeviceSize bytes, Memory memory) const {
   if (bytes > facts_.maxBufferSize)
-    throw MachineError(fmt::format("a buffer of {} bytes is beyond the maxBufferSize of {}, {} bytes; its heap has {}",
-                                   bytes, name(), facts_.maxBufferSize, memoryBytes()));
+    throw DeviceError(DeviceFault::Refused,
+                      fmt::format("a buffer of {} bytes is beyond the maxBufferSize of {}, {} bytes; its heap has {}",
+                                  bytes, name(), facts_.maxBufferSize, memoryBytes()));
   Buffer buffer;
   buffer.buffer_ = DeviceHandle<VkBuffer, &vkDestroyBuffer>(device_);
   buffer.size_ = bytes;
@@ -236,8 +250,9 @@ TexelView Device::createTexelView(const Buffer& buffer, VkFormat format, std::ui
 Image2D Device::createImage(std::uint32_t width, std::uint32_t height, VkFormat format) const {
   const std::uint32_t limit = limits().maxImageDimension2D;
   if (width > limit || height > limit)
-    throw MachineError(fmt::format("a picture of {} x {} pixels is beyond the maxImageDimension2D of {}, {}", width,
-                                   height, name(), limit));
+    throw DeviceError(DeviceFault::Refused,
+                      fmt::format("a picture of {} x {} pixels is beyond the maxImageDimension2D of {}, {}", width,
+                                  height, name(), limit));
   Image2D image;
   image.image_ = DeviceHandle<VkImage, &vkDestroyImage>(device_);
   image.view_ = DeviceHandle<VkImageView, &vkDestroyImageView>(device_);

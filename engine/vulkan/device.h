@@ -2,8 +2,10 @@
 #pragma once
 #include <volk.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -13,6 +15,7 @@
 #include "engine/vulkan/command_buffer.h"
 #include "engine/vulkan/compute_pipeline.h"
 #include "engine/vulkan/device_facts.h"
+#include "engine/vulkan/fault_plan.h"
 #include "engine/vulkan/graphics_pipeline.h"
 #include "engine/vulkan/image.h"
 #include "engine/vulkan/shader_module.h"
@@ -22,12 +25,15 @@
 namespace mote {
 
 struct DeviceSettings {
-  /// Keeps Memory::Device buffers unmapped even where they could be mapped: a CPU device then behaves as a discrete one.
+  /// Keeps Memory::Device buffers unmapped even where they could be mapped: a CPU device then behaves as a discrete
+  /// one.
   bool stageAlways = false;
   /// At most the heap: what buffers and pictures in device-local memory may take together.
   MemoryLimit memory = {};
   /// For tests: what every byte of a new buffer is set to, where it is mapped, as what nothing writes then shows.
   std::optional<std::uint8_t> fill = {};
+  /// For tests: calls that are to fail. Devices that follow each other share it.
+  std::shared_ptr<FaultPlan> faults = {};
 };
 
 /// One queue with graphics and compute, one command pool; for one thread. Outlives all it made.
@@ -61,6 +67,8 @@ class Device {
 
   /// Everything made here that lies in device-local memory, to the byte that the driver takes.
   const MemoryBudget& budget() const { return budget_; }
+  /// Another limit, at most the heap, for what is made from now on.
+  void limitMemory(std::uint64_t bytes) { budget_.limit_ = std::min(bytes, memoryBytes()); }
   /// Lets the budget's peak begin anew, at what is held now.
   void restartPeak() const { budget_.peak_ = budget_.held_; }
   /// What a buffer or picture would take of the budget: 0 where it would lie in the host's memory.
@@ -123,9 +131,13 @@ class Device {
   void createLayout(VkShaderStageFlags stages, std::uint32_t pushConstantBytes, VkPipelineLayout* layout,
                     const VkDescriptorSetLayout* set = nullptr) const;
 
+  /// What a call is to fail with.
+  VkResult fault(DeviceCall call) const;
+
   VkPhysicalDevice physicalDevice_;
   DeviceFacts facts_;
   DeviceSettings settings_;
+  mutable bool lost_ = false;  // by fault()
   mutable MemoryBudget budget_;
   std::uint32_t queueFamily_ = 0, timestampBits_ = 0;
   VkDevice device_ = VK_NULL_HANDLE;

@@ -95,8 +95,10 @@ ComputePipeline Device::createComputePipeline(std::span<const std::uint32_t> spi
   auto info = structure<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
   info.stage = stage(VK_SHADER_STAGE_COMPUTE_BIT, module, specialization);
   info.layout = pipeline.layout();
-  vkCheck(vkCreateComputePipelines(device_, VK_NULL_HANDLE, 1, &info, nullptr, pipeline.pipeline_.out()),
-          "vkCreateComputePipelines");
+  VkResult result = fault(DeviceCall::Pipeline);
+  if (result == VK_SUCCESS)
+    result = vkCreateComputePipelines(device_, VK_NULL_HANDLE, 1, &info, nullptr, pipeline.pipeline_.out());
+  vkCheck(result, "vkCreateComputePipelines");
   return pipeline;
 }
 
@@ -165,8 +167,10 @@ GraphicsPipeline Device::createGraphicsPipeline(const GraphicsPipelineInfo& want
   info.pColorBlendState = &blend;
   info.pDynamicState = &dynamic;
   info.layout = pipeline.layout();
-  vkCheck(vkCreateGraphicsPipelines(device_, VK_NULL_HANDLE, 1, &info, nullptr, pipeline.pipeline_.out()),
-          "vkCreateGraphicsPipelines");
+  VkResult result = fault(DeviceCall::Pipeline);
+  if (result == VK_SUCCESS)
+    result = vkCreateGraphicsPipelines(device_, VK_NULL_HANDLE, 1, &info, nullptr, pipeline.pipeline_.out());
+  vkCheck(result, "vkCreateGraphicsPipelines");
   return pipeline;
 }
 

@@ -29,9 +29,13 @@ void Device::submitAndWait(CommandBuffer commands) const {
   auto submit = structure<VkSubmitInfo2>(VK_STRUCTURE_TYPE_SUBMIT_INFO_2);
   submit.commandBufferInfoCount = 1;
   submit.pCommandBufferInfos = &buffer;
-  vkCheck(vkQueueSubmit2(queue_, 1, &submit, fence.get()), "vkQueueSubmit2");
+  VkResult result = fault(DeviceCall::Submit);
+  if (result == VK_SUCCESS) result = vkQueueSubmit2(queue_, 1, &submit, fence.get());
+  vkCheck(result, "vkQueueSubmit2");
   const VkFence waited = fence.get();
-  vkCheck(vkWaitForFences(device_, 1, &waited, VK_TRUE, ~0ull), "vkWaitForFences", fmt::format("on {}", name()));
+  result = vkWaitForFences(device_, 1, &waited, VK_TRUE, ~0ull);
+  if (result == VK_SUCCESS) result = fault(DeviceCall::Wait);  // nothing is under way any more
+  vkCheck(result, "vkWaitForFences", fmt::format("on {}", name()));
 }
 
 void Device::run(const std::function<void(CommandBuffer&)>& record) const {

@@ -155,7 +155,7 @@ TEST_F(MoteRenderBatch, AFrameAloneIsWhatItIsAmongAll) {
   ASSERT_EQ(render("all.#.exr").exitCode, 2);
   EXPECT_FALSE(bytes("all.3.exr") == third);
   expectSame("3", {3});
-  EXPECT_EQ(Json::parse(readBytes(folder_.file("stats.json")))["settled_by"], 2);
+  EXPECT_EQ(Json::parse(readBytes(folder_.file("stats.json")))["frames"][0]["settled_by"], 2);
   // It can be again: what went by the second is not what it would be now.
   writeBytes(folder_.file("p.1.prt"), first);
   ASSERT_EQ(render("all.#.exr", {"--resume"}).exitCode, 0);
