@@ -5,6 +5,7 @@
 
 #include "engine/passes/grid_parts.h"
 #include "engine/passes/part_size.h"
+#include "engine/vulkan/check.h"
 #include "spirv.h"
 
 namespace mote {
@@ -245,6 +246,12 @@ std::vector<float> GridDevice::runInParts(const GridArrays& tile, const Manner& 
   std::uint64_t share = partThatFits(device_, kShares, 0, arrays, device_.stagingCost(),
                                      "particles and receivers of a tile of the light grid");
   while (share > 0 && !texelsFit(sizes(share))) share /= 2;
+  if (!texelsFit(sizes(share)))
+    throw DeviceError(
+        DeviceFault::Refused,
+        fmt::format("the least part of a light grid's tile is beyond the maxTexelBufferElements of {}, {}; "
+                    "work with --lighting cpu, or with lighting.error 0",
+                    device_.name(), device_.mostTexels()));
   makeRoom(sizes(share));  // for all parts: what is stored must stay
   std::vector<float> depths(manner.channels * all.receivers);
   GridArrays part;

@@ -115,7 +115,7 @@ DeviceReport report(VkPhysicalDevice device, const std::string& overrides) {
   r.driver = facts.driver;
   needFeatures(facts, r.missing);
   needExtensions(facts, r.missing);
-  const std::vector<std::string> limits = missingLimits(properties.limits);
+  const std::vector<std::string> limits = missingLimits(properties.limits, facts.mostSubgroupSize);
   r.missing.insert(r.missing.end(), limits.begin(), limits.end());
   needSubgroups(facts, r.missing);
   needFormats(facts, r.missing);
@@ -157,18 +157,18 @@ std::size_t indexOf(const std::vector<DeviceReport>& reports, const std::string&
 
 }  // namespace
 
-std::vector<std::string> missingLimits(const VkPhysicalDeviceLimits& limits) {
+std::vector<std::string> missingLimits(const VkPhysicalDeviceLimits& limits, std::uint32_t mostSubgroupSize) {
   std::vector<std::string> missing;
   const auto need = [&](std::uint64_t has, std::uint64_t needed, const char* name) {
     if (has < needed) missing.push_back(fmt::format("limit {}: {} needed, {} there", name, needed, has));
   };
   // Every number is what a shader or pass uses. No shader has shared memory.
   need(limits.maxPushConstantsSize, 128, "maxPushConstantsSize");
-  need(limits.maxComputeWorkGroupInvocations, 64, "maxComputeWorkGroupInvocations");
-  need(limits.maxComputeWorkGroupSize[0], 64, "maxComputeWorkGroupSize[0]");
+  const std::uint32_t group = std::max(64u, mostSubgroupSize);  // whole subgroups
+  need(limits.maxComputeWorkGroupInvocations, group, "maxComputeWorkGroupInvocations");
+  need(limits.maxComputeWorkGroupSize[0], group, "maxComputeWorkGroupSize[0]");
   need(limits.maxColorAttachments, 2, "maxColorAttachments");
   need(limits.maxGeometryOutputVertices, 4, "maxGeometryOutputVertices");
-  need(limits.maxTexelBufferElements, 1 << 22, "maxTexelBufferElements");  // of GridDevice: 64 MiB of kernels
   if (!limits.timestampComputeAndGraphics) missing.push_back("limit timestampComputeAndGraphics");
   return missing;
 }

@@ -24,8 +24,9 @@ struct DeviceReport {
   std::vector<std::string> missing;  // what Mote needs and this device lacks, by name and number; empty: usable
 };
 
-/// The limits that are below what Mote's shaders and passes use: "limit NAME: A needed, B there".
-std::vector<std::string> missingLimits(const VkPhysicalDeviceLimits& limits);
+/// The limits that are below what Mote's shaders and passes use: "limit NAME: A needed, B there". Texel buffers and
+/// pictures may be of any size that Vulkan allows: the light grid is cut to fit, larger pictures are refused.
+std::vector<std::string> missingLimits(const VkPhysicalDeviceLimits& limits, std::uint32_t mostSubgroupSize);
 
 /// All devices in the loader's order: the number that `--device` takes is the index. Throws MachineError when a call
 /// fails; an empty list is no error. `overrides` as readFacts takes them.

@@ -48,13 +48,13 @@ TEST_F(DeviceTest, ReportSaysWhatADeviceIs) {
 }
 
 TEST_F(DeviceTest, MissingLimitsAreListedWithBothNumbers) {
-  EXPECT_TRUE(missingLimits(device().limits()).empty());
+  EXPECT_TRUE(missingLimits(device().limits(), device().mostSubgroupSize()).empty());
   VkPhysicalDeviceLimits limits = device().limits();
   limits.maxPushConstantsSize = 64;
   limits.timestampComputeAndGraphics = VK_FALSE;
   const std::vector<std::string> expected{"limit maxPushConstantsSize: 128 needed, 64 there",
                                           "limit timestampComputeAndGraphics"};
-  EXPECT_EQ(missingLimits(limits), expected);
+  EXPECT_EQ(missingLimits(limits, 64), expected);
 }
 
 TEST_F(DeviceTest, IsChosenByNumberOrPartOfItsName) {
