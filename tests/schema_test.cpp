@@ -425,13 +425,19 @@ TEST(SceneSchema, HasTheKeysThatTheParserAsksFor) {
 }
 
 TEST(SceneSchema, HasTheParsersDefaults) {
+  // Without the words of it, and without whether it says that the range is its shot.
+  const auto meaning = [](const json& text) {
+    Scene scene = parseScene(text.dump(), sceneFile());
+    scene.settings.clear(), scene.shot.reset();
+    return scene;
+  };
   std::size_t defaults = 0;
   Walk([&](const json& property, const std::string& pointer, const json& base) {
     if (!property.contains("default")) return;
     json scene = base;
     scene[Pointer(pointer)] = property["default"];
     ++defaults;
-    EXPECT_EQ(parseScene(scene.dump(), sceneFile()), parseScene(base.dump(), sceneFile())) << pointer;
+    EXPECT_EQ(meaning(scene), meaning(base)) << pointer;
   });
   EXPECT_GT(defaults, 60u);
 }
