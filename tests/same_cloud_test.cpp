@@ -71,7 +71,9 @@ void expectTheCloud(const OpenedFile& opened, const char* format) {
 
 TEST(SameCloud, InNpz) {
   const auto little = [](std::uint64_t value, std::size_t bytes) {
-    return std::string(reinterpret_cast<const char*>(&value), bytes);
+    std::string text(reinterpret_cast<const char*>(&value), std::min(bytes, sizeof value));
+    text.resize(bytes, '\0');
+    return text;
   };
   const std::string rows = std::to_string(cloud().size());
   std::string file, directory;
