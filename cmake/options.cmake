@@ -14,7 +14,9 @@ target_compile_options(mote_options INTERFACE -Wall -Wextra -Wshadow -ffp-contra
 if(MOTE_SANITIZE)
   # -O1: instrumented SIMD kernels take GCC minutes at -O2 and run no faster for it.
   target_compile_options(mote_options INTERFACE -O1)
-  target_compile_options(mote_options INTERFACE -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  # null, vptr and object-size: AddressSanitizer stops there too, and they take a quarter of the compiler's time.
+  target_compile_options(mote_options INTERFACE -fsanitize=address,undefined -fno-sanitize=null,vptr,object-size
+    -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(mote_options INTERFACE -fsanitize=address,undefined)
 endif()
 if(MOTE_FUZZ)
