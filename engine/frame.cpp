@@ -136,7 +136,7 @@ void settleDensity(Scene& scene, Frame& frame, FrameStats& stats) {
 
 /// True where this frame is one of many: of the shot, or of a sequence that other runs do the rest of.
 bool isAnimated(const Scene& scene) {
-  const Frames& shot = scene.shot ? *scene.shot : scene.frames;
+  const Frames& shot = scene.wholeShot();
   if (shot.first != shot.last || scene.camera.keys.size() > 1) return true;
   return std::any_of(scene.particles.begin(), scene.particles.end(),
                      [](const ParticleSource& source) { return hasFramePattern(source.file); });

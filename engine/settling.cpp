@@ -14,7 +14,7 @@ bool leavesOpen(const Scene& scene) {
 
 std::optional<int> settleByShot(Scene& scene, std::optional<int> before) {
   if (!leavesOpen(scene)) return {};
-  const Frames& shot = scene.shot ? *scene.shot : scene.frames;
+  const Frames& shot = scene.wholeShot();
   std::vector<std::string> dropped;
   const WarningsKept kept(dropped);
   for (int number = shot.first; number <= shot.last && number != before; number += shot.step) {

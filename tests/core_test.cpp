@@ -30,6 +30,7 @@
 #include "host/core/random.h"
 #include "host/core/sha256.h"
 #include "host/core/timer.h"
+#include "tests/support/contains.h"
 
 namespace mote {
 namespace {
@@ -75,10 +76,7 @@ std::string messageOf(const std::function<void()>& action) {
   return "(nothing thrown)";
 }
 
-testing::AssertionResult contains(const std::string& message, const std::string& part) {
-  if (message.find(part) != std::string::npos) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "'" << message << "' does not contain '" << part << "'";
-}
+using test::contains;
 
 // --- errors -------------------------------------------------------------------------------------------------------
 

@@ -4,14 +4,12 @@
 #include <gtest/gtest.h>
 
 #include "host/core/error.h"
+#include "tests/support/contains.h"
 
 namespace mote {
 namespace {
 
-testing::AssertionResult contains(const std::string& message, const std::string& part) {
-  if (message.find(part) != std::string::npos) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "'" << message << "' does not contain '" << part << "'";
-}
+using test::contains;
 
 TEST(FramePath, PadsTheFrameNumberToTheRunOfHashes) {
   EXPECT_EQ(framePath("a.####.exr", 12), "a.0012.exr");

@@ -97,9 +97,7 @@ std::uint64_t memoryOf(const Json& estimate) {
 void slurm(const SlurmOptions& options, const CommonOptions& common) {
   const Scene scene = openShot(options.shot);
   parseExposure(options.exposure);
-  if (!hasFramePattern(scene.output.file))
-    throw InputError(scene.output.file, "", "#### in the picture's name, since there are several frames",
-                     "the same name for all of them", "-o frame.####.exr, for example");
+  requireFramePattern(scene.output.file);
   Json found = preflight(scene, common);
   requireNothingMissing(found);
   for (const Json& sentence : found["suspicious"]) logWarning(sentence.get<std::string>());
@@ -122,11 +120,11 @@ void slurm(const SlurmOptions& options, const CommonOptions& common) {
   const auto absolute = [](const std::string& path) { return path.empty() ? path : fs::absolute(path).string(); };
   job.contactSheet = absolute(options.contactSheet), job.movie = absolute(options.movie);
   job.exposure = options.exposure;
-  job.folder = options.jobs.empty() ? fs::absolute(fs::path(scene.path).replace_extension(".farm"))
-                                    : fs::absolute(options.jobs);
+  job.folder =
+      options.jobs.empty() ? fs::absolute(fs::path(scene.path).replace_extension(".farm")) : fs::absolute(options.jobs);
   if (job.tasks() > kMostSlurmTasks)
-    throw InputError("--per-task", "", fmt::format("at most {} tasks", kMostSlurmTasks),
-                     fmt::format("{}", job.tasks()), "more frames a task make fewer of them");
+    throw InputError("--per-task", "", fmt::format("at most {} tasks", kMostSlurmTasks), fmt::format("{}", job.tasks()),
+                     "more frames a task make fewer of them");
   writeSlurmScripts(job);
   fmt::print("{} tasks of {} frames, each with {} CPUs, {} MiB and {} minutes: {}\n", job.tasks(), job.perTask,
              job.cpus, job.memoryMiB, job.minutes, (job.folder / "submit.sh").string());
@@ -142,8 +140,11 @@ void addFarmCommand(CLI::App& app, const CommonOptions& common, int& exitCode) {
   auto slurmOptions = std::make_shared<SlurmOptions>();
   CLI::App* command = farm->add_subcommand("slurm", "Write the shot as an array job of Slurm, and submit it");
   addShotOptions(*command, slurmOptions->shot);
-  command->add_option("--per-task", slurmOptions->perTask, "Frames a task")->type_name("N")->check(CLI::Range(1, 1 << 20));
-  command->add_option("--jobs", slurmOptions->jobs, "Folder for scripts and logs; SCENE.farm by default")->type_name("DIR");
+  command->add_option("--per-task", slurmOptions->perTask, "Frames a task")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1 << 20));
+  command->add_option("--jobs", slurmOptions->jobs, "Folder for scripts and logs; SCENE.farm by default")
+      ->type_name("DIR");
   command->add_option("--partition", slurmOptions->partition, "Slurm's partition")->type_name("NAME");
   command->add_option("--account", slurmOptions->account, "Slurm's account")->type_name("NAME");
   command->add_option("--cpus", slurmOptions->cpus, "CPUs a task; as many as here by default")

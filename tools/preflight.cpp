@@ -79,8 +79,7 @@ double bytesOf(const Scene& scene, int frame) {
   for (const ParticleSource& source : scene.particles) {
     if (source.file.empty()) continue;
     std::error_code error;
-    const auto size =
-        fs::file_size(framePath(source.file, fileFrame(source.file, frame, scene.inputs.missing)), error);
+    const auto size = fs::file_size(framePath(source.file, fileFrame(source.file, frame, scene.inputs.missing)), error);
     if (!error) bytes += static_cast<double>(size);
   }
   return bytes;
@@ -99,25 +98,29 @@ std::vector<std::string> suspicionsOf(const Scene& scene, const Frame& frame, co
   const double radius = stats.radius.mean;
   if (const double step = meanLength(particles.velocity) / static_cast<double>(scene.frames.fps);
       radius > 0 && step > kMostRadiiAFrame * radius)
-    list.push_back(fmt::format("velocities move particles by {:.0f} of their radii in a frame: are they per frame "
-                               "(particles[].velocity_per), or in another unit (particles[].unit)?",
-                               step / radius));
+    list.push_back(
+        fmt::format("velocities move particles by {:.0f} of their radii in a frame: are they per frame "
+                    "(particles[].velocity_per), or in another unit (particles[].unit)?",
+                    step / radius));
   const Bounds box = particles.bounds();
   if (const double diagonal = static_cast<double>(glm::length(box.hi - box.lo)); diagonal > 0 && radius > diagonal)
-    list.push_back(fmt::format("the mean radius, {:.3g}, is greater than the box of all particles, {:.3g} from corner "
-                               "to corner: is it in another unit?",
-                               radius, diagonal));
+    list.push_back(
+        fmt::format("the mean radius, {:.3g}, is greater than the box of all particles, {:.3g} from corner "
+                    "to corner: is it in another unit?",
+                    radius, diagonal));
   const vec3& extinction = frame.rules.extinction;
   const double depth = meanLineOpticalDepth(frame.density.tree(), frame.rules.falloff) *
                        static_cast<double>(extinction.x + extinction.y + extinction.z) / 3;
   if (stats.particles > 0 && depth < kThinnest)
-    list.push_back(fmt::format("the mean optical depth through the particles is {:.2g}: too thin to be seen; "
-                               "medium.optical_depth sets it instead of density_scale, {:.3g}",
-                               depth, stats.densityScale));
+    list.push_back(
+        fmt::format("the mean optical depth through the particles is {:.2g}: too thin to be seen; "
+                    "medium.optical_depth sets it instead of density_scale, {:.3g}",
+                    depth, stats.densityScale));
   if (depth > kThickest)
-    list.push_back(fmt::format("the mean optical depth through the particles is {:.2g}: nothing but their surface will "
-                               "be lit; medium.optical_depth sets it instead of density_scale, {:.3g}",
-                               depth, stats.densityScale));
+    list.push_back(
+        fmt::format("the mean optical depth through the particles is {:.2g}: nothing but their surface will "
+                    "be lit; medium.optical_depth sets it instead of density_scale, {:.3g}",
+                    depth, stats.densityScale));
   if (drawn == 0 && stats.particles > 0)
     list.push_back(fmt::format("the camera sees none of the {} particles in frame {}", stats.particles, frame.number));
   if (frame.lights.empty() && particles.emission.empty())
@@ -149,7 +152,7 @@ Measured measure(Scene scene, int number, const CommonOptions& common, RunStats&
   Renderer renderer(backends, gpu.get());
   Measured found;
   Timer timer;
-  if (const Frames& shot = scene.shot ? *scene.shot : scene.frames; number != shot.first) settleByShot(scene);
+  if (number != scene.wholeShot().first) settleByShot(scene);
   found.seconds["settling"] = timer.lap();
   FrameStats stats;
   const Frame frame = prepareFrame(scene, number, stats);
@@ -213,8 +216,7 @@ void printPreflight(const Json& found) {
   printScene(found);
   const Json& estimate = found["estimate"];
   const auto& frames = found["frames"];
-  const int count =
-      (frames["last"].get<int>() - frames["first"].get<int>()) / frames["step"].get<int>() + 1;
+  const int count = (frames["last"].get<int>() - frames["first"].get<int>()) / frames["step"].get<int>() + 1;
   if (!estimate.contains("seconds")) {
     row("work", fmt::format("{:.0f} rays a frame, {} threads", estimate["rays"].get<double>(),
                             estimate["threads"].get<unsigned>()));

@@ -18,8 +18,10 @@ namespace mote {
 ///   estimate    host_bytes and device_bytes of the frame with most particles, rays; measured_frame; seconds of its
 ///               stages (load, octree, lighting, draw, write), of it (frame) and of the run (all)
 /// One frame, that of the largest files, is loaded, its octree built, and samples of it lit, drawn and written to a
-/// temporary file on the backends that the scene names: about as long as a tenth of a frame in exact light. Frames with
-/// larger or smaller files count by their size. Not `measured`: only what headers tell. Throws InputError where a file is damaged, MachineError.
+/// temporary file on the backends that the scene names: for a million particles it takes about as long as the frame,
+/// for more a smaller part of it. Exact light is overestimated, up to twofold. Frames with larger or smaller files
+/// count by their size. Not `measured`: only what headers tell. Throws InputError where a file is damaged,
+/// MachineError.
 nlohmann::ordered_json preflight(const Scene& scene, const CommonOptions& common, bool measured = true);
 void printPreflight(const nlohmann::ordered_json& found);
 

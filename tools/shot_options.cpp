@@ -48,6 +48,12 @@ std::vector<std::string> argumentsOf(const ShotOptions& options) {
   return arguments;
 }
 
+void requireFramePattern(const std::string& pattern) {
+  if (!hasFramePattern(pattern))
+    throw InputError(pattern, "", "#### in the name, since there are several frames", "the same name for all of them",
+                     "frame.####.exr, for example");
+}
+
 std::optional<float> parseExposure(const std::string& text) {
   if (text == "auto") return std::nullopt;
   char* end = nullptr;

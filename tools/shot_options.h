@@ -20,6 +20,9 @@ Scene openShot(const ShotOptions& options);
 /// The command line that gives the same pictures from any folder, without --frames: the scene first.
 std::vector<std::string> argumentsOf(const ShotOptions& options);
 
+/// Throws InputError where a name of pictures has no place for the number of their frame.
+void requireFramePattern(const std::string& pattern);
+
 /// A number of stops, or none for "auto". Throws InputError naming --exposure.
 std::optional<float> parseExposure(const std::string& text);
 

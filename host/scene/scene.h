@@ -235,6 +235,9 @@ struct Scene {
   dvec3 movedBy{0};  ///< what has been taken off the places of camera and lights (moveOrigin)
   InputRules inputs;
 
+  /// The frames of which a run may draw a part; those of the run where the scene names none.
+  const Frames& wholeShot() const { return shot ? *shot : frames; }
+
   bool operator==(const Scene&) const = default;
 };
 

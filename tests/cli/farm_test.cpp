@@ -42,11 +42,10 @@ TEST_F(MoteFarm, WritesTheShotAsAnArrayJob) {
   EXPECT_TRUE(contains(result.out, "3 tasks of 2 frames, each with 3 CPUs, "));
   const std::string frames = readBytes(shot_ + "/scene.farm/frames.sbatch");
   const std::string scene = fmt::format("'{}'", folder_.file("it'\"'\"'s a shot/scene.json"));
-  for (const std::string& line :
-       {std::string("#SBATCH --array=1-3\n"), std::string("#SBATCH --cpus-per-task=3\n"),
-        std::string("#SBATCH --partition=render\n"), std::string("#SBATCH --requeue\n"),
-        " render " + scene + " '--set' '/medium/albedo=[0.9, 0.9, 0.9]' ", std::string(" '--set' '/frames/first=1' "),
-        std::string("--resume")})
+  for (const std::string& line : {std::string("#SBATCH --array=1-3\n"), std::string("#SBATCH --cpus-per-task=3\n"),
+                                  std::string("#SBATCH --partition=render\n"), std::string("#SBATCH --requeue\n"),
+                                  " render " + scene + " '--set' '/medium/albedo=[0.9, 0.9, 0.9]' ",
+                                  std::string(" '--set' '/frames/first=1' "), std::string("--resume")})
     EXPECT_TRUE(contains(frames, line)) << line << "\n" << frames;
   EXPECT_FALSE(contains(frames, "@"));
   // bash takes all of them.
@@ -55,7 +54,7 @@ TEST_F(MoteFarm, WritesTheShotAsAnArrayJob) {
 }
 
 TEST_F(MoteFarm, RefusesWhatCannotBecomeOne) {
-  EXPECT_TRUE(contains(slurm({"--frames", "1-5", "-o", "one.exr"}).err, "#### in the picture's name"));
+  EXPECT_TRUE(contains(slurm({"--frames", "1-5", "-o", "one.exr"}).err, "#### in the name"));
   const ProcessResult missing = slurm({"--frames", "1-9", "-o", "o.#.exr"});
   EXPECT_EQ(missing.exitCode, 2);
   EXPECT_TRUE(contains(missing.err, "got none for frames 6-9"));

@@ -13,13 +13,7 @@ namespace mote {
 namespace {
 
 using nlohmann::json;
-using test::contains;
-using test::kWithoutVulkan;
-using test::makeBall;
-using test::ProcessResult;
-using test::readBytes;
-using test::TempFolder;
-using test::writeBytes;
+using namespace test;
 
 const std::string kData = MOTE_SHARED_DATA;
 
@@ -229,7 +223,8 @@ TEST(MoteInfo, CountsTheMemoryOfWhatASceneAdds) {
   // What stands in no header is named.
   EXPECT_EQ(estimate("")["not_counted"].dump(), R"(["a Vulkan driver's own"])");
   EXPECT_TRUE(contains(estimate(solid)["not_counted"].dump(), "the solids' meshes and their tree"));
-  EXPECT_TRUE(contains(test::mote({"info", folder.file("s.json"), "--no-measure"}).out, "without the solids' meshes and their tree"));
+  EXPECT_TRUE(contains(test::mote({"info", folder.file("s.json"), "--no-measure"}).out,
+                       "without the solids' meshes and their tree"));
 }
 
 // What a sanitized program takes is mostly the sanitizer's: shadow memory, and what was freed held back.

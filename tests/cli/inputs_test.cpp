@@ -14,12 +14,7 @@ namespace mote {
 namespace {
 
 using nlohmann::json;
-using test::contains;
-using test::kWithoutVulkan;
-using test::makeBall;
-using test::ProcessResult;
-using test::TempFolder;
-using test::writeBytes;
+using namespace test;
 using Arguments = std::vector<std::string>;
 
 ProcessResult render(const std::string& scene, Arguments more) {

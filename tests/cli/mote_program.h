@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/contains.h"
 #include "tests/support/process.h"
 #include "tests/support/temp_folder.h"
 
@@ -21,11 +22,6 @@ inline const ProcessOptions kOnLavapipe{
 inline ProcessResult mote(std::vector<std::string> arguments, const ProcessOptions& options = {}) {
   arguments.insert(arguments.begin(), MOTE_BINARY);
   return runProcess(std::move(arguments), options);
-}
-
-inline testing::AssertionResult contains(const std::string& text, const std::string& part) {
-  if (text.find(part) != std::string::npos) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "no \"" << part << "\" in \"" << text << "\"";
 }
 
 /// A ball of 2000 particles, made by the program itself.

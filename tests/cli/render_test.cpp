@@ -17,14 +17,7 @@ namespace mote {
 namespace {
 
 using nlohmann::json;
-using test::contains;
-using test::kWithoutVulkan;
-using test::makeBall;
-using test::ProcessOptions;
-using test::ProcessResult;
-using test::readBytes;
-using test::TempFolder;
-using test::writeBytes;
+using namespace test;
 using Arguments = std::vector<std::string>;
 
 constexpr const char* kBallScene = R"({"particles": [{"file": "ball.prt"}], "output": {"size": [64, 48]}})";

@@ -6,15 +6,13 @@
 #include "host/image/compare.h"
 #include "host/scene/scene_reader.h"
 #include "tests/gpu/gpu_fixture.h"
+#include "tests/support/contains.h"
 #include "tests/support/temp_folder.h"
 
 namespace mote {
 namespace {
 
-testing::AssertionResult contains(const std::string& text, const std::string& part) {
-  if (text.find(part) != std::string::npos) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "no \"" << part << "\" in \"" << text << "\"";
-}
+using test::contains;
 
 TEST(FaultPlan, CountsEachKindOfCallForItself) {
   FaultPlan plan("lost@2,memory@1x2,refused-pipeline@1,memory-wait@3");
@@ -103,6 +101,22 @@ class Faults : public testing::Test {
     return result;
   }
 
+  /// RESULT-CALL@N for each of the calls and ever greater N, until the frame has no call of that number; `check` gets
+  /// what came of it, with the one warning that each is to cost.
+  template <class Check>
+  void everyFault(const std::string& result, std::initializer_list<const char*> calls, const Check& check) {
+    for (const char* call : calls)
+      for (int n = 1;; n += 1 + n) {
+        const std::string faults = fmt::format("{}-{}@{}", result, call, n);
+        SCOPED_TRACE(faults);
+        const Result drawn = render(kGpu, faults);
+        ASSERT_LT(n, 1000) << "the frame does not end";
+        ASSERT_LE(drawn.warnings.size(), 1u);
+        check(drawn);
+        if (drawn.warnings.empty()) break;
+      }
+  }
+
   static void expectSame(const Image& a, const Image& b, const std::string& what) {
     EXPECT_TRUE(a.pixels == b.pixels) << what;
     EXPECT_TRUE(a.depth == b.depth) << what;
@@ -123,23 +137,17 @@ TEST_F(Faults, ALostDeviceIsOpenedAnewAndThePictureIsTheSame) {
   EXPECT_EQ(whole.warnings, std::vector<std::string>{});
   EXPECT_EQ(whole.stats.lighting + whole.stats.raster, "gpugpu");
   int lighting = 0, solids = 0, picture = 0;
-  // Ever later, until the frame has no call of that number.
-  for (const std::string call : {"submit", "allocate", "pipeline"})
-    for (int n = 1;; n += 1 + n) {
-      const std::string faults = "lost-" + call + "@" + std::to_string(n);
-      const Result result = render(kGpu, faults);
-      expectSame(result.image, whole.image, faults);
-      if (result.warnings.empty()) break;
-      ASSERT_LT(n, 1000) << "the frame does not end";
-      ASSERT_EQ(result.warnings.size(), 1u) << faults;
-      EXPECT_TRUE(contains(result.warnings[0], "frame 1: "));
-      EXPECT_TRUE(contains(result.warnings[0], " failed: VK_ERROR_DEVICE_LOST"));
-      EXPECT_TRUE(contains(result.warnings[0], "; repeated with the device opened anew, and that went well"));
-      lighting += contains(result.warnings[0], "frame 1: lighting on ") ? 1 : 0;
-      solids += contains(result.warnings[0], "frame 1: lighting of its solids on ") ? 1 : 0;
-      picture += contains(result.warnings[0], "frame 1: picture on ") ? 1 : 0;
-      EXPECT_EQ(result.stats.lighting + result.stats.raster, "gpugpu");
-    }
+  everyFault("lost", {"submit", "allocate", "pipeline"}, [&](const Result& result) {
+    expectSame(result.image, whole.image, "the picture");
+    EXPECT_EQ(result.stats.lighting + result.stats.raster, "gpugpu");
+    if (result.warnings.empty()) return;
+    EXPECT_TRUE(contains(result.warnings[0], "frame 1: "));
+    EXPECT_TRUE(contains(result.warnings[0], " failed: VK_ERROR_DEVICE_LOST"));
+    EXPECT_TRUE(contains(result.warnings[0], "; repeated with the device opened anew, and that went well"));
+    lighting += contains(result.warnings[0], "frame 1: lighting on ") ? 1 : 0;
+    solids += contains(result.warnings[0], "frame 1: lighting of its solids on ") ? 1 : 0;
+    picture += contains(result.warnings[0], "frame 1: picture on ") ? 1 : 0;
+  });
   EXPECT_GT(lighting, 2);
   EXPECT_GT(solids, 0);
   EXPECT_GT(picture, 1);
@@ -188,24 +196,19 @@ TEST_F(Faults, MemoryThatRunsOutIsTriedWithInSmallerParts) {
   const Result whole = render(kGpu, "");
   const std::uint64_t limit = limit_;
   int lighting = 0, picture = 0;
-  for (const std::string call : {"allocate", "wait"})
-    for (int n = 1;; n += 1 + n) {
-      const std::string faults = "memory-" + call + "@" + std::to_string(n);
-      const Result result = render(kGpu, faults);
-      // Light by a tree in parts differs by rounding.
-      EXPECT_LT(compareImages(result.image, whole.image).overall.max, 1e-4) << faults;
-      if (result.warnings.empty()) break;
-      ASSERT_LT(n, 1000) << "the frame does not end";
-      ASSERT_EQ(result.warnings.size(), 1u) << faults;
-      EXPECT_TRUE(contains(result.warnings[0], "failed: VK_ERROR_OUT_OF_DEVICE_MEMORY"));
-      EXPECT_TRUE(contains(result.warnings[0], "; repeated in parts that hold at most "));
-      EXPECT_TRUE(contains(result.warnings[0], " bytes of its memory, and that went well"));
-      const bool ofPicture = contains(result.warnings[0], "frame 1: picture");
-      EXPECT_EQ(limit_ == Recovery::kLeastLimit, ofPicture) << "each step has a limit of its own";
-      EXPECT_EQ(limit_ == limit, !ofPicture);
-      lighting += contains(result.warnings[0], "frame 1: lighting") ? 1 : 0;
-      picture += contains(result.warnings[0], "frame 1: picture") ? 1 : 0;
-    }
+  everyFault("memory", {"allocate", "wait"}, [&](const Result& result) {
+    // Light by a tree in parts differs by rounding.
+    EXPECT_LT(compareImages(result.image, whole.image).overall.max, 1e-4);
+    if (result.warnings.empty()) return;
+    EXPECT_TRUE(contains(result.warnings[0], "failed: VK_ERROR_OUT_OF_DEVICE_MEMORY"));
+    EXPECT_TRUE(contains(result.warnings[0], "; repeated in parts that hold at most "));
+    EXPECT_TRUE(contains(result.warnings[0], " bytes of its memory, and that went well"));
+    const bool ofPicture = contains(result.warnings[0], "frame 1: picture");
+    EXPECT_EQ(limit_ == Recovery::kLeastLimit, ofPicture) << "each step has a limit of its own";
+    EXPECT_EQ(limit_ == limit, !ofPicture);
+    lighting += contains(result.warnings[0], "frame 1: lighting") ? 1 : 0;
+    picture += contains(result.warnings[0], "frame 1: picture") ? 1 : 0;
+  });
   EXPECT_GT(lighting, 2);
   EXPECT_GT(picture, 0);
 }

@@ -10,6 +10,7 @@
 #include "host/core/error.h"
 #include "host/scene/scene_reader.h"
 #include "host/solids/mesh.h"
+#include "tests/support/contains.h"
 #include "tests/support/gltf.h"
 #include "tests/support/temp_folder.h"
 
@@ -44,11 +45,6 @@ class Shot {
 };
 
 inline std::string errorOf(const std::string& members) { return Shot(gltf(members)).error(); }
-
-inline testing::AssertionResult contains(const std::string& text, const std::string& part) {
-  if (text.find(part) != std::string::npos) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "'" << text << "' does not contain '" << part << "'";
-}
 
 /// Single precision of numbers up to 20.
 inline void expectNear(const vec3& a, const vec3& b) {

@@ -7,6 +7,7 @@
 
 #include "host/core/error.h"
 #include "host/scene/scene_reader.h"
+#include "tests/support/contains.h"
 
 namespace mote::test {
 
@@ -25,11 +26,6 @@ inline std::string errorOf(const std::string& text, const Overrides& overrides =
     return error.what();
   }
   return {};
-}
-
-inline testing::AssertionResult contains(const std::string& message, const std::string& part) {
-  if (message.find(part) != std::string::npos) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "'" << message << "' does not contain '" << part << "'";
 }
 
 }  // namespace mote::test
