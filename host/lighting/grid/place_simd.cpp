@@ -42,17 +42,15 @@ HWY_INLINE NarrowVec supported(const KernelWeights& weights, NarrowVec narrowed)
   return hn::Max(hn::Mul(set(weights.leastSupport), narrowed), whole);
 }
 
-// ---- locate
-
-/// Bits of a mask, lane by lane.
-HWY_INLINE unsigned bitsOf(Mask mask) {
-  std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(kTag, mask, bits);
-  return bits[0];
+/// The square by which an ellipse is wider, on the side where it is, than the circle seen from straight ahead.
+HWY_INLINE NarrowVec widening(Vec u, Vec v) {
+  return hn::DemoteTo(kNarrow, hn::Add(set(1), hn::Max(square(u), square(v))));
 }
 
+// ---- locate
+
 struct OnFace {
-  Vec u, v, z, face;
+  Vec u, v, inverseZ, face;
   Vec distanceSquare;
   Mask nowhere;
 };
@@ -66,7 +64,7 @@ HWY_INLINE OnFace onCube(Vec px, Vec py, Vec pz) {
   const Vec inverse = hn::Div(set(1), z);
   return {hn::Mul(choose(py, pz, px), inverse),
           hn::Mul(choose(pz, px, py), inverse),
-          z,
+          inverse,
           face,
           hn::Add(hn::Add(square(px), square(py)), square(pz)),
           hn::Eq(z, zero)};
@@ -101,11 +99,11 @@ void locateAll(const LocatePoints& points, const GridShape& shape, double* keys,
         hn::Add(hn::Mul(hn::Add(hn::Mul(at.face, set(1 << 24)), number(row)), set(1 << 24)), number(column));
     const Vec final = hn::IfThenElse(at.nowhere, set(kNoTile), key);
     // How far a kernel's nodes reach, on the face of the centre.
-    const Vec cells2 = square(hn::Div(hn::Mul(r, perCell), at.z));
+    const Vec cells2 = square(hn::Mul(hn::Mul(r, perCell), at.inverseZ));
     const Vec narrowed = hn::Sub(hn::Max(cells2, tentBelow), narrowing);
-    Vec wide = hn::PromoteTo(kTag, hn::Sqrt(supported(shape.weights, hn::DemoteTo(kNarrow, narrowed))));
-    if (perspective) wide = hn::Mul(wide, hn::Sqrt(hn::Add(one, hn::Max(square(at.u), square(at.v)))));
-    const Vec reach = hn::IfThenElse(hn::Gt(cells2, tentBelow), wide, one);
+    NarrowVec wide2 = supported(shape.weights, hn::DemoteTo(kNarrow, narrowed));
+    if (perspective) wide2 = hn::Mul(wide2, widening(at.u, at.v));
+    const Vec reach = hn::IfThenElse(hn::Gt(cells2, tentBelow), hn::PromoteTo(kTag, hn::Sqrt(wide2)), one);
     const Vec inX = hn::Sub(x, hn::Mul(column, set(size))), inY = hn::Sub(y, hn::Mul(row, set(size)));
     const auto before = [&](Vec in) { return hn::Le(hn::Sub(in, reach), set(kSlack)); };
     const auto behind = [&](Vec in) { return hn::Ge(hn::Add(in, reach), set(size - kSlack)); };
@@ -120,19 +118,14 @@ void locateAll(const LocatePoints& points, const GridShape& shape, double* keys,
     const std::pair<Mask, LocateFlags> all[] = {{before(inX), kLeft},     {behind(inX), kRight}, {before(inY), kBelow},
                                                 {behind(inY), kAbove},    {anywhere, kAnywhere}, {near, kNearLight},
                                                 {hn::Le(r, zero), kPoint}};
-    std::uint8_t bits[8] = {};
-    for (const auto& [mask, flag] : all) {
-      const unsigned set = bitsOf(mask);
-      if (set == 0) continue;
-      for (std::size_t lane = 0; lane < lanes(); ++lane)
-        bits[lane] |= static_cast<std::uint8_t>((set >> lane & 1) * flag);
-    }
-    double out[8];
-    hn::StoreU(final, kTag, out);
-    for (std::size_t lane = 0; lane < count; ++lane) {
-      keys[i + lane] = out[lane];
-      flags[i + lane] = bits[lane];
-    }
+    Vec sum = zero;
+    for (const auto& [mask, flag] : all) sum = hn::Add(sum, hn::IfThenElseZero(mask, set(flag)));
+    double key8[8];
+    std::int32_t flags8[8];
+    hn::StoreU(final, kTag, key8);
+    hn::StoreU(hn::DemoteTo(kNarrowInt, sum), kNarrowInt, flags8);
+    std::copy_n(key8, count, keys + i);
+    std::copy_n(flags8, count, flags + i);
   };
   for (std::size_t i = 0; i < points.count; i += lanes()) part(i, std::min(lanes(), points.count - i));
 }
@@ -166,18 +159,20 @@ HWY_INLINE void storeBin(Vec depth, std::int32_t* to) {
 
 struct InFrame {
   Vec x, y, z, depth;  // depth [scene units]
+  Vec inverseZ;        // of a point light
 };
 HWY_INLINE InFrame placeInFrame(const GridTile& tile, GridPoints& points, std::size_t i) {
   const LightFrame& frame = tile.frame;
   const Vec px = hn::Sub(widen(points.sourceX.at(i)), set(frame.origin.x)),
             py = hn::Sub(widen(points.sourceY.at(i)), set(frame.origin.y)),
             pz = hn::Sub(widen(points.sourceZ.at(i)), set(frame.origin.z));
-  InFrame at{along(px, py, pz, frame.u), along(px, py, pz, frame.v), along(px, py, pz, frame.axis), {}};
+  InFrame at{along(px, py, pz, frame.u), along(px, py, pz, frame.v), along(px, py, pz, frame.axis), {}, {}};
   at.depth = at.z;
   Vec perCell = set(1 / tile.shape->resolution.cell);
   if (frame.perspective) {
     at.depth = hn::Sqrt(hn::Add(hn::Add(square(at.x), square(at.y)), square(at.z)));
-    perCell = hn::Div(perCell, at.z);
+    at.inverseZ = hn::Div(set(1), at.z);
+    perCell = hn::Mul(perCell, at.inverseZ);
   }
   store(hn::Sub(hn::Mul(at.x, perCell), set(tile.firstColumn)), &points.x[i]);
   store(hn::Sub(hn::Mul(at.y, perCell), set(tile.firstRow)), &points.y[i]);
@@ -203,39 +198,45 @@ void placeKernels(GridTile& tile) {
   for (std::size_t i = 0; i < to.points.count; i += lanes()) {
     const InFrame at = placeInFrame(tile, to.points, i);
     const Vec r = widen(to.radius.at(i));
-    Vec cells = hn::Mul(r, perCell), sag = zero, stretch = one, formA = one, formB = zero, formC = one, reach = one;
+    Vec cells = hn::Mul(r, perCell), sag = zero, stretch = one, formA = one, formB = zero, formC = one;
+    NarrowVec wider = hn::Set(kNarrow, 1.0f);
     Mask shown = hn::Gt(r, zero);
     if (perspective) {
-      cells = hn::Div(cells, at.z);
-      sag = hn::Div(hn::Mul(set(moments.variance), square(r)), at.depth);  // ⟨b²⟩ / 2ρ
-      // b² = z² · (Δu² + Δv² + (Δu·v − Δv·u)²) / n, n = 1 + u² + v² (column.h): an ellipse of the area π (r/z)² √n.
-      const Vec u = hn::Div(at.x, at.z), v = hn::Div(at.y, at.z), uu = square(u), vv = square(v);
-      const Vec n = hn::Add(one, hn::Add(uu, vv));
-      formA = hn::Div(hn::Add(one, vv), n), formC = hn::Div(hn::Add(one, uu), n);
-      formB = hn::Div(hn::Mul(set(-2), hn::Mul(u, v)), n);
-      stretch = hn::Sqrt(n);
-      reach = hn::Sqrt(hn::Add(one, hn::Max(uu, vv)));
+      const Vec inverseDepth = hn::Div(one, at.depth);
+      cells = hn::Mul(cells, at.inverseZ);
+      sag = hn::Mul(hn::Mul(set(moments.variance), square(r)), inverseDepth);  // ⟨b²⟩ / 2ρ
+      // b² = z² · (Δu² + Δv² + (Δu·v − Δv·u)²) / n, n = 1 + u² + v² = (ρ/z)² (column.h): an ellipse of the area
+      // π (r/z)² √n.
+      const Vec u = hn::Mul(at.x, at.inverseZ), v = hn::Mul(at.y, at.inverseZ);
+      const Vec inverseN = square(hn::Mul(at.z, inverseDepth));
+      formA = hn::Mul(hn::Add(one, square(v)), inverseN), formC = hn::Mul(hn::Add(one, square(u)), inverseN);
+      formB = hn::Mul(hn::Mul(set(-2), hn::Mul(u, v)), inverseN);
+      stretch = hn::Mul(at.depth, at.inverseZ);
+      wider = widening(u, v);
       shown = hn::And(shown, hn::And(hn::Ge(at.depth, hn::Mul(set(kNearLightRadii / 2), r)),
                                      hn::Gt(at.z, hn::Mul(set(kLeastCosine / 2), at.depth))));
     }
     const Vec narrowed = hn::Sub(hn::Max(square(cells), tentBelow), narrowing);
     const NarrowVec single = hn::DemoteTo(kNarrow, narrowed), support = supported(weights, single);
-    const Vec wide = hn::Mul(hn::PromoteTo(kTag, hn::Sqrt(support)), reach);
+    const Vec wide = hn::PromoteTo(kTag, hn::Sqrt(hn::Mul(support, wider)));
     Vec half = hn::IfThenElse(hn::Gt(square(cells), tentBelow), wide, one);
     Vec total = hn::Mul(hn::Mul(mass, square(cells)), stretch), curved = zero;
     if (perspective) {
       const Mask bent = hn::And(shown, hn::Lt(at.depth, hn::Mul(set(kCurvedRadii), r)));
-      curved = hn::IfThenElseZero(bent, hn::Div(hn::Mul(hn::Div(square(at.z), square(r)), square(cells)), narrowed));
-      // Over the solid angle: ∫ F dΩ = π · mass · s² · (1 + variance · s²) with s = r/ρ, to the second order.
-      const Vec s2 = square(hn::Div(r, at.depth));
-      const Vec angle = hn::Mul(hn::Mul(mass, s2), hn::Add(one, hn::Mul(set(moments.variance), s2)));
-      total = hn::IfThenElse(bent, hn::Mul(angle, square(perCell)), total);
+      if (!hn::AllFalse(kTag, bent)) {
+        curved = hn::IfThenElseZero(bent, hn::Div(hn::Mul(hn::Div(square(at.z), square(r)), square(cells)), narrowed));
+        // Over the solid angle: ∫ F dΩ = π · mass · s² · (1 + variance · s²) with s = r/ρ, to the second order.
+        const Vec s2 = square(hn::Div(r, at.depth));
+        const Vec angle = hn::Mul(hn::Mul(mass, s2), hn::Add(one, hn::Mul(set(moments.variance), s2)));
+        total = hn::IfThenElse(bent, hn::Mul(angle, square(perCell)), total);
+      }
     }
     half = hn::IfThenElseZero(shown, half);
     const Vec depth = hn::Sub(hn::Mul(hn::Sub(at.depth, sag), perBin), base), radius = hn::Mul(r, perBin);
     store(half, &to.half[i]), store(hn::IfThenElseZero(shown, curved), &to.curved[i]);
-    store(hn::Div(formA, narrowed), &to.a[i]), store(hn::Div(formB, narrowed), &to.b[i]);
-    store(hn::Div(formC, narrowed), &to.c[i]), store(total, &to.mass[i]);
+    const Vec perNarrowed = hn::Div(one, narrowed);
+    store(hn::Mul(formA, perNarrowed), &to.a[i]), store(hn::Mul(formB, perNarrowed), &to.b[i]);
+    store(hn::Mul(formC, perNarrowed), &to.c[i]), store(total, &to.mass[i]);
     hn::StoreU(hn::Div(single, support), kNarrow, &to.slope[i]);
     store(depth, &to.depth[i]), store(radius, &to.depthRadius[i]);
     storeBin(hn::Sub(depth, radius), &to.firstBin[i]), storeBin(hn::Add(depth, radius), &to.lastBin[i]);

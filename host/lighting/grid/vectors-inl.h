@@ -47,12 +47,13 @@ HWY_INLINE Group scaled(const float* from, float factor) {
   return eachPart(
       [&](std::size_t k) { return hn::Mul(hn::LoadU(kGroupTag, from + k * kGroupLanes), hn::Set(kGroupTag, factor)); });
 }
+template <class D>
+HWY_INLINE void addTo(D tag, float* to, float weight, hn::Vec<D> shares) {
+  hn::StoreU(hn::Add(hn::LoadU(tag, to), hn::Mul(hn::Set(tag, weight), shares)), tag, to);
+}
 HWY_INLINE void addTo(float* to, float weight, const Group& shares) {
-  for (std::size_t k = 0; k < kGroupBins / kGroupLanes; ++k) {
-    float* at = to + k * kGroupLanes;
-    const auto share = hn::Mul(hn::Set(kGroupTag, weight), shares.part[k]);
-    hn::StoreU(hn::Add(hn::LoadU(kGroupTag, at), share), kGroupTag, at);
-  }
+  for (std::size_t k = 0; k < kGroupBins / kGroupLanes; ++k)
+    addTo(kGroupTag, to + k * kGroupLanes, weight, shares.part[k]);
 }
 
 /// Weights of a quadratic form, which rounding may have taken below 0 (KernelWeights). `slope`: GridParticles::slope.
