@@ -8,7 +8,7 @@
 namespace mote {
 namespace {
 
-constexpr layout::uint kBlocks = layout::kTileBlocks * layout::kTileBlocks;
+constexpr layout::uint kRow = layout::kTileBlocks, kBlocks = kRow * kRow;
 static_assert(kTileCells + 1 <= layout::kBlockEdge * layout::kTileBlocks);
 static_assert(kGroupBins == layout::kBlockBins);
 
@@ -16,7 +16,7 @@ static_assert(kGroupBins == layout::kBlockBins);
 int numberOf(const GridTile& tile, int group) { return tile.placeOfGroup(group) / kGroupBins - 1; }
 
 std::uint32_t kindOf(const layout::GridKernel& kernel) {
-  return kernel.c > 0 ? kEllipseKernels : kernel.c < 0 ? kCurvedKernels : kTentKernels;
+  return kernel.curved > 0 ? kCurvedKernels : kernel.form > 0 ? kEllipseKernels : kTentKernels;
 }
 
 void setReceivers(const GridTile& tile, const Receivers& receivers, std::span<const std::uint32_t> members,
@@ -57,8 +57,8 @@ void GridBlocks::setUp(GridTile& tile, const Receivers& receivers, std::span<con
                        std::span<const std::uint32_t> slots, GridArrays& to) {
   groups_ = static_cast<std::size_t>(*std::max_element(tile.groupAt.begin(), tile.groupAt.end())) / kGroupBins;
   const std::size_t count = tile.particles.points.count, room = count + kGridBatch;
-  to.kernels.resize(room), nodes_.resize(room);
-  weighTile(tile, to.kernels.data(), nodes_.data());
+  to.kernels.resize(room), blocks_.resize(room);
+  weighTile(tile, to.kernels.data(), blocks_.data());
   to.kernels.resize(count);
   setKernels(tile, to);
   sortEntries(to);
@@ -78,23 +78,21 @@ void GridBlocks::setKernels(GridTile& tile, GridArrays& to) {
   // Beyond the end: where blocks are counted that a kernel has not.
   start_.assign((kBlocks + layout::kTileBlocks + 2) * groups_ + 4, 0);
   std::uint32_t* const counts = start_.data() + 2;  // sortEntries
+  inverseRadius_ = count > 0 ? to.kernels.front().inverseRadius : 0;
+  const auto alike = [&](float radius) { return radius == p.depthRadius.front(); };
   to.kinds = 0;
+  if (!std::all_of(p.depthRadius.data(), p.depthRadius.data() + count, alike)) to.kinds = kSeveralRadii;
   for (std::size_t i = 0; i < count; ++i) {
-    const CoveredNodes nodes =
-        nodes_[i] == CoveredNodes::kAny ? setLone(tile, i, to.kernels[i]) : CoveredNodes(nodes_[i]);
+    const bool lone = blocks_[i] == CoveredBlocks::kAny;
+    const CoveredBlocks blocks = lone ? CoveredBlocks(setLone(tile, i, to.kernels[i])) : CoveredBlocks(blocks_[i]);
     places_[i] = {};
-    const int first = numberOf(tile, p.firstBin[i] >> 2);
-    if (first < 0 || nodes.empty()) continue;
-    const auto block = [](std::int32_t node) { return static_cast<std::uint32_t>(node) / layout::kBlockEdge; };
-    const std::uint32_t row = block(nodes.firstRow), column = block(nodes.firstColumn);
-    const Place place{(row * layout::kTileBlocks + column) * groups + static_cast<std::uint32_t>(first),
-                      static_cast<std::uint16_t>(std::min(p.lastBin[i] >> 2, lastGroup) - (p.firstBin[i] >> 2) + 1),
-                      static_cast<std::uint8_t>(block(nodes.endColumn - 1) - column + 1),
-                      static_cast<std::uint8_t>(block(nodes.endRow - 1) - row + 1)};
+    const int firstGroup = p.firstBin[i] >> 2, first = numberOf(tile, firstGroup);
+    if (first < 0 || blocks.columns == 0) continue;
+    const Place place{blocks.first * groups + static_cast<std::uint32_t>(first),
+                      static_cast<std::uint16_t>(std::min(p.lastBin[i] >> 2, lastGroup) - firstGroup + 1),
+                      static_cast<std::uint8_t>(blocks.columns), static_cast<std::uint8_t>(blocks.rows)};
     places_[i] = place;
-    to.kinds |= nodes_[i] == CoveredNodes::kAny ? kindOf(to.kernels[i])
-                : p.half[i] > 1                 ? kEllipseKernels
-                                                : kTentKernels;
+    to.kinds |= kindOf(to.kernels[i]);
     forEachBlock(place, groups, [&](std::uint32_t at, std::uint32_t really) { counts[at] += really; });
   }
 }
@@ -116,7 +114,7 @@ CoveredNodes GridBlocks::setLone(GridTile& tile, std::size_t i, layout::GridKern
   kernel.scale = tile.channels > 1 ? lone.scale : lone.scale * p.peak[0][i];
   if (p.curved[i] > 0) {
     const auto cell = static_cast<float>(tile.shape->resolution.cell);
-    kernel.a = p.curved[i] * (cell * cell), kernel.b = 0, kernel.c = -1;
+    kernel.form = p.curved[i] * (cell * cell), kernel.curved = 1;
   }
   CoveredNodes nodes;
   nodes.firstColumn = std::max(lone.firstColumn, 0), nodes.firstRow = std::max(lone.firstRow, 0);
@@ -131,13 +129,19 @@ template <class Add>
 void GridBlocks::forEachBlock(const Place& place, std::uint32_t groups, const Add& add) {
   const std::uint32_t rowStep = layout::kTileBlocks * groups;
   if (place.rows <= 2 && place.columns <= 2 && place.groups <= 2) {
-    const std::uint32_t here = place.groups > 0 ? 1 : 0, deep = place.groups > 1 ? 1 : 0;
-    const std::uint32_t right = place.columns > 1 ? 1 : 0, below = place.rows > 1 ? 1 : 0;
-    const std::uint32_t at = place.first, under = at + rowStep;
-    add(at, here), add(at + 1, deep);
-    add(at + groups, here & right), add(at + groups + 1, deep & right);
-    add(under, here & below), add(under + 1, deep & below);
-    add(under + groups, here & below & right), add(under + groups + 1, deep & below & right);
+    if (place.groups == 0) return;
+    const bool deep = place.groups > 1;
+    const std::uint32_t at = place.first;
+    const auto both = [&](std::uint32_t from) {
+      add(from, 1u);
+      if (deep) add(from + 1, 1u);
+    };
+    both(at);
+    if (place.columns > 1) both(at + groups);
+    if (place.rows > 1) {
+      both(at + rowStep);
+      if (place.columns > 1) both(at + rowStep + groups);
+    }
     return;
   }
   for (std::uint32_t row = 0; row < place.rows; ++row)
@@ -148,13 +152,13 @@ void GridBlocks::forEachBlock(const Place& place, std::uint32_t groups, const Ad
 
 void GridBlocks::sortEntries(GridArrays& to) {
   // Counts stand two places on; they become beginnings one place on, those ends, and so the next one's beginnings but
-  // for the gap that makes each even: shaders load two at once.
+  // for the gaps (roomForEntries).
   std::uint32_t all = 0;
   start_[0] = 0;
   for (std::size_t k = 0; k < kBlocks * groups_; ++k) {
     const std::uint32_t count = start_[k + 2];
     start_[k + 1] = all;
-    all += evenEntries(count);
+    all += roomForEntries(count);
   }
   to.entries.resize(all);
   std::uint32_t *const next = start_.data() + 1, *const entries = to.entries.data();
@@ -177,23 +181,27 @@ void GridBlocks::setWorks(const GridTile& tile, GridArrays& to) const {
   to.works.clear(), to.blocks.clear(), to.strands.clear();
   to.table.resize(kBlocks * groups_);
   to.storedBlocks = 0, to.begun = false;
-  const double cell = tile.shape->resolution.cell;
+  const double cell = tile.frame.perspective ? tile.shape->resolution.cell : 0;
   for (std::size_t b = 0; b < kBlocks; ++b) {
     const std::size_t column = b % layout::kTileBlocks * layout::kBlockEdge,
                       row = b / layout::kTileBlocks * layout::kBlockEdge;
     layout::GridWork work{};
+    work.inverseRadius = inverseRadius_;
     work.column = static_cast<float>(column), work.row = static_cast<float>(row);
     work.u = static_cast<float>((tile.firstColumn + static_cast<double>(column)) * cell);
     work.v = static_cast<float>((tile.firstRow + static_cast<double>(row)) * cell);
     const auto strand = static_cast<layout::uint>(to.works.size());
     std::uint32_t last = 0;
     for (std::size_t g = 0; g < groups_; ++g) {
-      const std::uint32_t first = evenEntries(start_[b * groups_ + g]), end = start_[b * groups_ + g + 1];
+      const std::uint32_t first = roomForEntries(start_[b * groups_ + g]), end = start_[b * groups_ + g + 1];
       if (first < end) last = 2 * ++to.storedBlocks;
-      if (first < end && end % 2 != 0) to.entries[end] = to.entries[end - 1];
+      if (first < end)
+        std::fill(to.entries.begin() + end, to.entries.begin() + roomForEntries(end), to.entries[end - 1]);
       const std::uint32_t entry = last + (first < end ? 1 : 0);
       to.table[g * kBlocks + b].here = entry;
-      if (b > 0) to.table[g * kBlocks + b - 1].right = entry;
+      if (b >= 1) to.table[g * kBlocks + b - 1].right = entry;
+      if (b >= kRow) to.table[g * kBlocks + b - kRow].below = entry;
+      if (b >= kRow + 1) to.table[g * kBlocks + b - kRow - 1].belowRight = entry;
       work.bin = binOf[g];
       for (work.first = first; work.first < end; work.first = work.end) {
         work.end = std::min(end, work.first + kMostWorkEntries);

@@ -10,13 +10,15 @@
 namespace mote {
 
 /// What kernels of a tile are; a tile with several kinds has all their bits.
-enum GridKernelKinds : std::uint32_t { kTentKernels = 1, kEllipseKernels = 2, kCurvedKernels = 4 };
+enum GridKernelKinds : std::uint32_t { kTentKernels = 1, kEllipseKernels = 2, kCurvedKernels = 4, kSeveralRadii = 8 };
 
 /// Particles that a lane sums up: where more meet in a block, several do, and their sums are added up one after the
 /// other, however much a device may hold, so that a small budget can have the same bits.
 constexpr std::uint32_t kMostWorkEntries = 1 << 11;
-/// A work's entries begin at an even place; so many are kept for `count`, the last of which may be there twice.
-constexpr std::uint32_t evenEntries(std::uint32_t count) { return (count + 1) & ~1u; }
+/// A work's entries begin where shaders load; so many are kept for `count`, the last of which may be there again.
+constexpr std::uint32_t roomForEntries(std::uint32_t count) {
+  return (count + layout::kEntriesAtOnce - 1) / layout::kEntriesAtOnce * layout::kEntriesAtOnce;
+}
 /// Of a GridReceiver: of one group.
 constexpr std::uint32_t kGroupPlaces = layout::kTileBlocks * layout::kTileBlocks * layout::kBlockBins;
 
@@ -39,7 +41,7 @@ struct GridArrays {
   std::vector<layout::GridWork> works;  ///< strand by strand, by depth
   std::vector<std::uint32_t> blocks;    ///< that each is of
   std::vector<layout::GridStrand> strands;
-  std::vector<layout::GridEntryPair> table;
+  std::vector<layout::GridPlaces> table;
   std::vector<layout::GridReceiver> receivers;
   std::vector<float> own[3];       ///< of the receivers: what each finds of its own particle
   std::uint32_t storedBlocks = 0;  ///< without the one of zeros
@@ -72,9 +74,10 @@ class GridBlocks {
   void setWorks(const GridTile& tile, GridArrays& to) const;
 
   std::size_t groups_ = 0;
-  std::vector<std::uint32_t> nodes_;  // of the tile's particles (CoveredNodes)
-  std::vector<Place> places_;         // of the tile's particles
-  std::vector<std::uint32_t> start_;  // [block][group]: of entries
+  float inverseRadius_ = 0;            // of all kernels, unless they are kSeveralRadii
+  std::vector<std::uint32_t> blocks_;  // of the tile's particles (CoveredBlocks)
+  std::vector<Place> places_;          // of the tile's particles
+  std::vector<std::uint32_t> start_;   // [block][group]: of entries
 };
 
 }  // namespace mote

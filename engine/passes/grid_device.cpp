@@ -15,7 +15,8 @@ namespace {
 constexpr std::uint64_t kBatchBytes = std::uint64_t{64} << 20;
 
 constexpr std::uint32_t kKernelTexelBytes = 16;  // half a GridKernel
-constexpr std::uint32_t kPairBytes = 8;          // two entries or sums, a GridPair, a GridEntryPair
+constexpr std::uint32_t kEntryTexelBytes = layout::kEntriesAtOnce * sizeof(std::uint32_t);
+constexpr std::uint32_t kPairBytes = 8;  // two sums, a GridPair
 
 /// A buffer's elements to be filled: where it is mapped they are the buffer's own, else they are copied at the end.
 template <class T>
@@ -42,19 +43,21 @@ class Filling {
 GridDevice::GridDevice(const Device& device)
     : device_(device),
       queries_(device.createTimestampQueries(1)),
-      groupSize_(device.isCpu() ? device.subgroupSize() : std::max(64u, device.mostSubgroupSize())) {}
+      readGroupSize_(std::max(64u, device.mostSubgroupSize())),
+      groupSize_(device.isCpu() ? device.subgroupSize() : readGroupSize_) {}
 
 const ComputePipeline& GridDevice::fill(const FillVariant& variant) {
   ComputePipeline& made = fills_[variant];
   if (made.handle() != VK_NULL_HANDLE) return made;
   const auto has = [&](std::uint32_t kind) { return std::uint32_t{(variant.kinds & kind) != 0}; };
   made = device_.createComputePipeline(spirv::grid_fill_comp, sizeof(layout::GridParams),
-                                       std::array<SpecializationConstant, 6>{{{0, groupSize_},
+                                       std::array<SpecializationConstant, 7>{{{0, groupSize_},
                                                                               {1, variant.falloff},
                                                                               {2, has(kTentKernels)},
                                                                               {3, has(kEllipseKernels)},
                                                                               {4, has(kCurvedKernels)},
-                                                                              {5, variant.colours}}},
+                                                                              {5, variant.colours},
+                                                                              {6, has(kSeveralRadii)}}},
                                        2);
   return made;
 }
@@ -75,7 +78,7 @@ GridDevice::Sizes GridDevice::sizesOf(const GridCounts& counts, const Manner& ma
           counts.works * kUint,
           counts.strands * sizeof(layout::GridStrand),
           counts.stored * layout::kBlockPairs * sizeof(layout::GridPair),
-          counts.table * sizeof(layout::GridEntryPair),
+          counts.table * sizeof(layout::GridPlaces),
           counts.receivers * sizeof(layout::GridReceiver),
           manner.channels * counts.receivers * kFloat};
 }
@@ -92,9 +95,10 @@ void GridDevice::release() {
 }
 
 bool GridDevice::texelsFit(const Sizes& sizes) const {
-  const std::uint64_t longest = std::max(
-      {sizes[kKernels] / kKernelTexelBytes, sizes[kEntries] / kPairBytes, sizes[kSums] / kPairBytes,
-       sizes[kStored] / kPairBytes, sizes[kTable] / kPairBytes, sizes[kReceivers] / sizeof(layout::GridReceiver)});
+  const std::uint64_t longest =
+      std::max({sizes[kKernels] / kKernelTexelBytes, sizes[kEntries] / kEntryTexelBytes, sizes[kSums] / kPairBytes,
+                sizes[kStored] / kPairBytes, sizes[kTable] / sizeof(layout::GridPlaces),
+                sizes[kReceivers] / sizeof(layout::GridReceiver)});
   return longest <= device_.mostTexels();
 }
 
@@ -119,10 +123,10 @@ void GridDevice::makeRoom(const Sizes& sizes) {
   if (!arraysFit(device_, {room.begin(), room.end()}, device_.stagingCost())) room = sizes;
   for (std::size_t k = 0; k < sizes.size(); ++k) *buffers[k] = device_.createBuffer(room[k]);
   kernelTexels_ = device_.createTexelView(buffers_.kernels, VK_FORMAT_R32G32B32A32_SFLOAT, kKernelTexelBytes);
-  entryTexels_ = device_.createTexelView(buffers_.entries, VK_FORMAT_R32G32_UINT, kPairBytes);
+  entryTexels_ = device_.createTexelView(buffers_.entries, VK_FORMAT_R32G32B32A32_UINT, kEntryTexelBytes);
   sumTexels_ = device_.createTexelView(buffers_.sums, VK_FORMAT_R32G32_SFLOAT, kPairBytes);
   storedTexels_ = device_.createTexelView(buffers_.stored, VK_FORMAT_R32G32_SFLOAT, kPairBytes);
-  tableTexels_ = device_.createTexelView(buffers_.table, VK_FORMAT_R32G32_UINT, kPairBytes);
+  tableTexels_ = device_.createTexelView(buffers_.table, VK_FORMAT_R32G32B32A32_UINT, sizeof(layout::GridPlaces));
   receiverTexels_ =
       device_.createTexelView(buffers_.receivers, VK_FORMAT_R32G32B32A32_UINT, sizeof(layout::GridReceiver));
   device_.upload<layout::GridPair>(buffers_.stored, std::vector<layout::GridPair>(layout::kBlockPairs));
@@ -136,7 +140,7 @@ std::vector<GridWorks> GridDevice::upload(std::span<const GridArrays* const> til
   const Filling<std::uint32_t> entries(device_, to.entries, sizes[kEntries]);
   const Filling<std::uint32_t> blocks(device_, to.blocks, sizes[kBlocks]);
   const Filling<layout::GridStrand> strands(device_, to.strands, sizes[kStrands]);
-  const Filling<layout::GridEntryPair> table(device_, to.table, sizes[kTable]);
+  const Filling<layout::GridPlaces> table(device_, to.table, sizes[kTable]);
   const Filling<layout::GridReceiver> receivers(device_, to.receivers, sizes[kReceivers]);
   const Filling<float> own(device_, to.depths, sizes[kDepths]);
   join(tiles, channels,
@@ -184,7 +188,7 @@ std::vector<float> GridDevice::run(std::span<const GridArrays* const> tiles, con
                                         std::array<SpecializationConstant, 2>{{{0, groupSize_}, {1, begun}}}, 1);
   if (read_.handle() == VK_NULL_HANDLE)
     read_ = device_.createComputePipeline(spirv::grid_read_comp, sizeof(layout::GridParams),
-                                          std::array<SpecializationConstant, 1>{{{0, groupSize_}}}, 3);
+                                          std::array<SpecializationConstant, 1>{{{0, readGroupSize_}}}, 3);
   const std::size_t kernels = sizes[kKernels] / sizeof(layout::GridKernel);
   const std::size_t receivers = sizes[kReceivers] / sizeof(layout::GridReceiver),
                     strands = sizes[kStrands] / sizeof(layout::GridStrand);
@@ -205,7 +209,7 @@ std::vector<float> GridDevice::run(std::span<const GridArrays* const> tiles, con
       commands.barrier(barrier::computeToCompute);
       of.count = static_cast<layout::uint>(receivers);
       commands.bindTexels(read_, {storedTexels_.handle(), tableTexels_.handle(), receiverTexels_.handle()});
-      commands.dispatchRow(read_, of, (receivers + groupSize_ - 1) / groupSize_);
+      commands.dispatchRow(read_, of, (receivers + readGroupSize_ - 1) / readGroupSize_);
       of.peaks += kernels * sizeof(float), of.depths += receivers * sizeof(float);
     }
     queries_.end(commands, stage);

@@ -105,8 +105,10 @@ void join(std::span<const GridArrays* const> tiles, std::size_t channels, const 
     }
     // What lies before everything is the same block for all.
     const auto entry = [&](std::uint32_t own) { return own < 2 ? 0 : own + 2 * base.stored; };
-    for (std::size_t k = 0; k < tile.table.size(); ++k)
-      to.table[base.table + k] = {entry(tile.table[k].here), entry(tile.table[k].right)};
+    for (std::size_t k = 0; k < tile.table.size(); ++k) {
+      const auto& [here, right, below, belowRight] = tile.table[k];
+      to.table[base.table + k] = {entry(here), entry(right), entry(below), entry(belowRight)};
+    }
     for (std::size_t k = 0; k < tile.receivers.size(); ++k) {
       layout::GridReceiver receiver = tile.receivers[k];
       receiver.place += base.table * layout::kBlockBins;

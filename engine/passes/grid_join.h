@@ -15,7 +15,7 @@ struct GridTargets {
   std::span<std::uint32_t> entries;
   std::span<std::uint32_t> blocks;
   std::span<layout::GridStrand> strands;
-  std::span<layout::GridEntryPair> table;
+  std::span<layout::GridPlaces> table;
   std::span<layout::GridReceiver> receivers;
   std::span<float> own;  ///< [channel][receiver]
 };

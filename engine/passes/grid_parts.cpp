@@ -47,7 +47,7 @@ void GridParts::setSteps() {
 
 void GridParts::setLeast() {
   for (const layout::GridWork& work : tile_.works)
-    least_.entries = std::max<std::uint64_t>(least_.entries, evenEntries(work.end - work.first));
+    least_.entries = std::max<std::uint64_t>(least_.entries, roomForEntries(work.end - work.first));
   least_.kernels = least_.entries;
   least_.strands = least_.works = 1;
   least_.stored = tile_.strands.size() + 1;
@@ -99,7 +99,7 @@ bool GridParts::addWork(const Step& step) {
   const auto isNew = [&](std::uint32_t kernel) { return localOf_[kernel] == kNone; };
   GridCounts has = has_;
   has.kernels += static_cast<std::uint64_t>(std::count_if(entries.begin(), entries.end(), isNew));
-  has.entries += evenEntries(number(entries.size()));
+  has.entries += roomForEntries(number(entries.size()));
   has.works += 1, has.strands += chosen.works.empty() ? 1 : 0;
   if (!has.within(most_) || (!goesOn && free_.empty())) return false;
   has_ = has;
@@ -145,7 +145,7 @@ void GridParts::putStrand(const Chosen& chosen, GridArrays& to) const {
     work.first = number(to.entries.size());
     for (const std::uint32_t kernel : entries) to.entries.push_back(localOf_[kernel]);
     work.end = number(to.entries.size());
-    if (work.end % 2 != 0) to.entries.push_back(to.entries.back());
+    to.entries.resize(roomForEntries(work.end), to.entries.back());
     work.sums = number(to.works.size());
     to.works.push_back(work);
     to.blocks.push_back(slotOf_[tile_.blocks[w]]);
@@ -159,11 +159,11 @@ void GridParts::putReceivers(GridArrays& to) const {
   for (const std::uint32_t group : groups_)
     for (std::size_t b = 0; b < kColumns; ++b) {
       const auto entry = [&](std::size_t strand) {
-        if (strand == kColumns) return 0u;
+        if (strand >= kColumns) return 0u;
         const std::uint32_t own = tile_.table[group * kColumns + strand].here;
         return 2 * slotOf_[own >> 1] + (own & 1);
       };
-      to.table.push_back({entry(b), entry(b + 1)});
+      to.table.push_back({entry(b), entry(b + 1), entry(b + layout::kTileBlocks), entry(b + layout::kTileBlocks + 1)});
     }
   std::size_t at = 0;
   for (const std::uint32_t k : receivers_) {

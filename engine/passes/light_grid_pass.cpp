@@ -86,7 +86,7 @@ std::vector<float> LightGridPass::opticalDepths(const Octree& tree, const Receiv
   const GridShape shape = gridShape(light, resolution, options.falloff);
   const GridPlan plan = planGrid(tree, receivers, shape, reached);
   const float slack = columnRules(tree, light, receivers.bounds()).slack;
-  const GridDevice::Manner manner{options.falloff, channels > 1, channels, resolution.cell};
+  const GridDevice::Manner manner{options.falloff, channels > 1, channels, shape.perspective() ? resolution.cell : 0};
   Call call{tree, receivers, options, shape, plan, slack, done, std::move(depths)};
   for (std::size_t begin = 0; begin < plan.tiles.size();) {
     std::span<const Work> works = setUpTiles(call, begin);

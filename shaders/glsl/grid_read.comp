@@ -7,7 +7,7 @@
 #include "lib/grid.glsl"
 
 layout(binding = 0) uniform textureBuffer stored;      // GridPair
-layout(binding = 1) uniform utextureBuffer places;     // GridEntryPair
+layout(binding = 1) uniform utextureBuffer places;     // GridPlaces
 layout(binding = 2) uniform utextureBuffer receivers;  // GridReceiver
 
 void main() {
@@ -18,13 +18,13 @@ void main() {
   const vec2 xy = uintBitsToFloat(receiver.xy);
   const uint table = receiver.w / kBlockBins, bin = receiver.w % kBlockBins;
   const vec2 below = clamp(floor(xy), 0.0, float(kBlockEdge * (kTileBlocks - 1) - 1)), into = xy - below;
-  const uint column = uint(below.x), row = uint(below.y), block = table + column / kBlockEdge;
-  const uvec2 entries[2] = {texelFetch(places, int(block + row / kBlockEdge * kTileBlocks)).xy,
-                            texelFetch(places, int(block + (row + 1) / kBlockEdge * kTileBlocks)).xy};
+  const uint column = uint(below.x), row = uint(below.y);
+  const uvec4 around = texelFetch(places, int(table + row / kBlockEdge * kTileBlocks + column / kBlockEdge));
   vec2 edges[4];
   [[unroll]] for (uint corner = 0; corner < 4; ++corner) {
     const uint c = column + corner % 2, r = row + corner / 2;
-    const uint entry = c / kBlockEdge == column / kBlockEdge ? entries[corner / 2].x : entries[corner / 2].y;
+    const uvec2 beside = r / kBlockEdge == row / kBlockEdge ? around.xy : around.zw;
+    const uint entry = c / kBlockEdge == column / kBlockEdge ? beside.x : beside.y;
     const bool here = (entry & 1u) != 0;  // else all lies before: the last edge of the block that it names
     const uint node = (here ? bin : kBlockBins - 1) * kBlockNodes + r % kBlockEdge * kBlockEdge + c % kBlockEdge;
     edges[corner] = texelFetch(stored, int((entry >> 1) * kBlockPairs + node)).xy;

@@ -150,6 +150,14 @@ class Binning {
     TileLookup lookup(keys_);
     for (std::size_t slot = begin; slot < end; ++slot) {
       const std::size_t home = located.key[slot] == kNoTile ? TileLookup::kNone : lookup(located.key[slot]);
+      if (home != TileLookup::kNone && located.flags[slot] == 0 && reached.empty()) {
+        // Most stand within their tile, and so do their neighbours.
+        std::size_t last = slot + 1;
+        while (last < end && located.key[last] == located.key[slot] && located.flags[last] == 0) ++last;
+        put(2 * home, static_cast<std::uint32_t>(slot), static_cast<std::uint32_t>(last));
+        slot = last - 1;
+        continue;
+      }
       const bool receives = home != TileLookup::kNone && (reached.empty() || reached[slot] != 0);
       if (receives) put(2 * home, static_cast<std::uint32_t>(slot));
       particle(located, slot, receives ? home : TileLookup::kNone, home, put);
@@ -224,7 +232,7 @@ KernelWeights kernelWeights(layout::uint falloff) {
   switch (falloff) {
     case layout::kFalloffLinear: return {1.9, 0.65, 1, 0};
     case layout::kFalloffSphere: return {1.4, 0.4, 1, 0};
-    default: return {2.25, 0.73, layout::kGridSmoothSupport, layout::kGridSmoothMargin};
+    default: return {2.25, 0.73, 0.75, 0.72};
   }
 }
 

@@ -183,13 +183,8 @@ struct CoveredNodes {
 
   /// More than a kernel has [cells]: a device may round otherwise.
   static constexpr float kSlack = 1e-3f;
-  /// Of one that goes alone: its own constructor says which nodes.
-  static constexpr std::uint32_t kAny = ~std::uint32_t{0};
 
   CoveredNodes() = default;
-  /// A byte each.
-  explicit CoveredNodes(std::uint32_t word)
-      : firstColumn(word & 255), endColumn(word >> 8 & 255), firstRow(word >> 16 & 255), endRow(word >> 24) {}
   /// Of a kernel about (x, y) that goes so far.
   CoveredNodes(float x, float y, float reach) {
     constexpr float kEnd = kTileCells + 1;
@@ -203,6 +198,25 @@ struct CoveredNodes {
   bool empty() const { return firstColumn >= endColumn || firstRow >= endRow; }
 };
 
+/// The blocks of a tile (shaders/glsl/layout/grid.h) that those nodes lie in.
+struct CoveredBlocks {
+  std::uint32_t first = 0;              ///< by rows
+  std::uint32_t columns = 0, rows = 0;  ///< 0: none
+
+  CoveredBlocks() = default;
+  explicit CoveredBlocks(const CoveredNodes& nodes) {
+    if (nodes.empty()) return;
+    const auto block = [](std::int32_t node) { return static_cast<std::uint32_t>(node) / layout::kBlockEdge; };
+    const std::uint32_t row = block(nodes.firstRow), column = block(nodes.firstColumn);
+    first = row * layout::kTileBlocks + column;
+    columns = block(nodes.endColumn - 1) - column + 1, rows = block(nodes.endRow - 1) - row + 1;
+  }
+  /// In one word: a byte of columns, one of rows, and the first.
+  explicit CoveredBlocks(std::uint32_t word) : first(word >> 16), columns(word & 255), rows(word >> 8 & 255) {}
+  /// Of one that goes alone: CoveredNodes's constructors say which.
+  static constexpr std::uint32_t kAny = ~std::uint32_t{0};
+};
+
 /// The steps on vectors, the same bits on every instruction set.
 /// Places of points, bins included.
 void placePoints(const GridTile& tile, GridPoints& points);
@@ -212,10 +226,10 @@ LoneKernel weighAlone(const GridTile& tile, std::size_t particle);
 /// Puts one that goes alone down, on the tile's nodes.
 void putDownAlone(GridTile& tile, std::size_t particle);
 /// For who puts them down elsewhere, a device: their kernels, with weights for a peak of 1 where there are several
-/// channels, GridParticles::own, and of those that go by batches which of the tile's nodes they cover (CoveredNodes; of
-/// others kAny). Of those that are curved or reach farther than kMostReach, weights and own are not set, for
-/// weighAlone. `kernels` and `nodes` have room for a step more.
-void weighTile(GridTile& tile, layout::GridKernel* kernels, std::uint32_t* nodes);
+/// channels, GridParticles::own, and of those that go by batches which of the tile's blocks they cover (CoveredBlocks;
+/// of others kAny). Of those that are curved or reach farther than kMostReach, weights and own are not set, for
+/// weighAlone. `kernels` and `blocks` have room for a step more.
+void weighTile(GridTile& tile, layout::GridKernel* kernels, std::uint32_t* blocks);
 /// Puts down those that go by batches, and lists those that go alone.
 void putDownBatches(GridTile& tile);
 /// Every node's run of bins becomes the sums up to each bin's end.

@@ -15,12 +15,34 @@
 HWY_BEFORE_NAMESPACE();
 namespace mote::HWY_NAMESPACE {
 
+/// Which kernels lie in no more groups of bins than go by batches.
+HWY_INLINE auto areShallow(const GridParticles& p, std::size_t i) {
+  const auto firstGroup = hn::ShiftRight<2>(hn::LoadU(kIntTag, &p.firstBin[i]));
+  const auto lastGroup = hn::ShiftRight<2>(hn::LoadU(kIntTag, &p.lastBin[i]));
+  return hn::Lt(hn::Sub(lastGroup, firstGroup), hn::Set(kIntTag, kMostGroups));
+}
+
+/// Of a whole batch, as windowOf says; false as well where some of it are beyond the end.
+HWY_INLINE bool areTents(const GridParticles& p, std::size_t first) {
+  bool all = first + kGridBatch <= p.points.count;
+  for (std::size_t i = first; all && i < first + kGridBatch; i += kLanes) {
+    const Vec half = load(&p.half[i]), zero = hn::Zero(kTag);
+    const auto tents = hn::AndNot(hn::Gt(load(&p.curved[i]), zero), hn::And(hn::Gt(half, zero), hn::Le(half, set(1))));
+    all = hn::AllTrue(kTag, tents) && hn::AllTrue(kIntTag, areShallow(p, i));
+  }
+  return all;
+}
+
 /// Nodes across that have all of a batch's kernels, an even number, and which of them are tents.
 struct BatchWindow {
   int nodes = 2;
   alignas(64) float tent[kGridBatch] = {};
 
   BatchWindow(const GridParticles& p, std::size_t first) {
+    if (areTents(p, first)) {
+      std::fill_n(tent, kGridBatch, 1.0f);
+      return;
+    }
     for (std::size_t lane = 0; lane < std::min(kGridBatch, p.points.count - first); ++lane) {
       const std::size_t i = first + lane;
       const int window = windowOf(p, i);
@@ -32,36 +54,42 @@ struct BatchWindow {
   }
 };
 
-/// The twin of CoveredNodes of windowOf and reachOf, in one word.
-HWY_INLINE auto coveredNodes(const GridParticles& p, std::size_t i) {
-  const hn::RebindToSigned<decltype(kTag)> ints;
+/// The twin of CoveredBlocks of windowOf and reachOf, in one word.
+HWY_INLINE auto coveredBlocks(const GridParticles& p, std::size_t i) {
+  const IntTag ints;
   const Vec half = load(&p.half[i]), zero = hn::Zero(kTag);
   const Vec reach = hn::Add(hn::Max(half, set(1)), set(CoveredNodes::kSlack));
   const auto first = [&](Vec at) {
     const Vec low = hn::Min(hn::Max(hn::Sub(at, reach), zero), set(kTileCells + 1));
     return hn::ConvertTo(ints, hn::Ceil(low));
   };
-  const auto end = [&](Vec at) {
+  const auto last = [&](Vec at) {
     const Vec high = hn::Min(hn::Max(hn::Add(at, reach), set(-1)), set(kTileCells));
-    return hn::ConvertTo(ints, hn::Add(hn::Floor(high), set(1)));
+    return hn::ConvertTo(ints, hn::Floor(high));
   };
   const Vec x = load(&p.points.x[i]), y = load(&p.points.y[i]);
-  const auto columns = hn::Or(first(x), hn::ShiftLeft<8>(end(x)));
-  const auto word = hn::Or(columns, hn::Or(hn::ShiftLeft<16>(first(y)), hn::ShiftLeft<24>(end(y))));
-  const auto firstGroup = hn::ShiftRight<2>(hn::LoadU(ints, &p.firstBin[i]));
-  const auto lastGroup = hn::ShiftRight<2>(hn::LoadU(ints, &p.lastBin[i]));
-  const auto shallow = hn::Lt(hn::Sub(lastGroup, firstGroup), hn::Set(ints, kMostGroups));
+  const auto column = first(x), row = first(y), lastColumn = last(x), lastRow = last(y);
+  static_assert(layout::kBlockEdge == 4 && layout::kTileBlocks == 9);
+  const auto block = [](auto node) { return hn::ShiftRight<2>(node); };
+  const auto count = [&](auto from, auto to) { return hn::Add(hn::Sub(block(to), block(from)), hn::Set(ints, 1)); };
+  const auto at = hn::Add(hn::Add(hn::ShiftLeft<3>(block(row)), block(row)), block(column));
+  const auto all =
+      hn::Or(hn::ShiftLeft<16>(at), hn::Or(hn::ShiftLeft<8>(count(row, lastRow)), count(column, lastColumn)));
+  const auto none = hn::Or(hn::Gt(column, lastColumn), hn::Gt(row, lastRow));
+  const auto word = hn::IfThenZeroElse(none, all);
   const auto narrow = hn::And(hn::Gt(half, zero), hn::Le(half, set(0.5f * kMostWindow)));
   const auto flat = hn::Not(hn::Gt(load(&p.curved[i]), zero));
-  const auto batched = hn::And(hn::RebindMask(ints, hn::And(narrow, flat)), shallow);
+  const auto batched = hn::And(hn::RebindMask(ints, hn::And(narrow, flat)), areShallow(p, i));
   return hn::IfThenElse(batched, word, hn::Set(ints, -1));
 }
 
 /// Sums of F over windows of any width, and F between the nodes where the particles stand.
 template <layout::uint kFalloff>
-HWY_NOINLINE void weighAll(GridTile& tile, layout::GridKernel* kernels, std::uint32_t* nodes) {
+HWY_NOINLINE void weighAll(GridTile& tile, layout::GridKernel* kernels, std::uint32_t* blocks) {
   GridParticles& p = tile.particles;
   const bool colours = tile.channels > 1;
+  const Vec cell = set(tile.frame.perspective ? static_cast<float>(tile.shape->resolution.cell) : 0.0f);
+  const Vec firstRow = set(static_cast<float>(tile.firstRow));
   for (std::size_t first = 0; first < p.points.count; first += kGridBatch) {
     const BatchWindow window(p, first);
     for (std::size_t lane = 0; lane < kGridBatch; lane += kLanes) {
@@ -95,27 +123,27 @@ HWY_NOINLINE void weighAll(GridTile& tile, layout::GridKernel* kernels, std::uin
       const Vec upper = between(corner(leftX, backY, backX, intoY), corner(backX, backY, intoX, intoY), intoX);
       const Vec inverse = hn::Div(one, load(&p.depthRadius[i])), scale = hn::Div(load(&p.mass[i]), sum);
       const Vec depth = load(&p.depth[i]);
+      const Vec v = hn::Mul(hn::Add(y, firstRow), cell), round = hn::Div(a, hn::Add(one, hn::Mul(v, v)));
       alignas(64) float place[4 * kLanes], form[4 * kLanes];
-      hn::StoreInterleaved4(x, y, depth, inverse, kTag, place);
-      hn::StoreInterleaved4(a, b, hn::IfThenElse(tent, zero, c),
-                            colours ? scale : hn::Mul(scale, load(p.peak[0].at(i))), kTag, form);
+      hn::StoreInterleaved4(x, y, depth, colours ? scale : hn::Mul(scale, load(p.peak[0].at(i))), kTag, place);
+      hn::StoreInterleaved4(hn::IfThenElse(tent, zero, round), slope, zero, inverse, kTag, form);
       for (std::size_t k = 0; k < kLanes; ++k) {
         std::memcpy(&kernels[i + k].x, place + 4 * k, 4 * sizeof(float));
-        std::memcpy(&kernels[i + k].a, form + 4 * k, 4 * sizeof(float));
+        std::memcpy(&kernels[i + k].form, form + 4 * k, 4 * sizeof(float));
       }
       const hn::RebindToUnsigned<decltype(kTag)> words;
-      hn::StoreU(hn::BitCast(words, coveredNodes(p, i)), words, nodes + i);
+      hn::StoreU(hn::BitCast(words, coveredBlocks(p, i)), words, blocks + i);
       const Vec across = hn::Mul(scale, between(lower, upper, intoY));
       hn::StoreU(hn::Mul(across, ownDepthShare(p, i, depth, inverse)), kTag, &p.own[i]);
     }
   }
 }
 
-void weighBatches(GridTile& tile, layout::GridKernel* kernels, std::uint32_t* nodes) {
+void weighBatches(GridTile& tile, layout::GridKernel* kernels, std::uint32_t* blocks) {
   switch (tile.falloff) {
-    case layout::kFalloffLinear: return weighAll<layout::kFalloffLinear>(tile, kernels, nodes);
-    case layout::kFalloffSphere: return weighAll<layout::kFalloffSphere>(tile, kernels, nodes);
-    default: return weighAll<layout::kFalloffSmooth>(tile, kernels, nodes);
+    case layout::kFalloffLinear: return weighAll<layout::kFalloffLinear>(tile, kernels, blocks);
+    case layout::kFalloffSphere: return weighAll<layout::kFalloffSphere>(tile, kernels, blocks);
+    default: return weighAll<layout::kFalloffSmooth>(tile, kernels, blocks);
   }
 }
 
@@ -127,8 +155,8 @@ namespace mote {
 
 HWY_EXPORT(weighBatches);
 
-void weighTile(GridTile& tile, layout::GridKernel* kernels, std::uint32_t* nodes) {
-  HWY_DYNAMIC_DISPATCH(weighBatches)(tile, kernels, nodes);
+void weighTile(GridTile& tile, layout::GridKernel* kernels, std::uint32_t* blocks) {
+  HWY_DYNAMIC_DISPATCH(weighBatches)(tile, kernels, blocks);
 }
 
 }  // namespace mote

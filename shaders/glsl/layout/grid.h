@@ -13,43 +13,42 @@ MOTE_CONST uint kBlockNodes = 16u;
 MOTE_CONST uint kBlockBins = 4u;
 MOTE_CONST uint kBlockPairs = 64u;
 MOTE_CONST uint kTileBlocks = 9u;    // along the edge of a tile of 33 nodes
+MOTE_CONST uint kEntriesAtOnce = 4u;
 
-// Weights of the smooth falloff end at this q, or so many cells sooner than F(q) (KernelWeights in host/lighting/grid/plan.h).
-MOTE_CONST float kGridSmoothSupport = 0.75f;
-MOTE_CONST float kGridSmoothMargin = 0.72f;
-
-// A particle's kernel: weights F(q) with q = a·Δx² + b·Δx·Δy + c·Δy² in nodes. Where c is 0 it is a tent over a cell.
-// Where it is −1 the light is near, and q = a · (Δx² + Δy² + (Δx·v − Δy·u)²) / n with (u, v) of the node, n = 1 + u² + v².
+// A particle's kernel: weights F(q) with q = form · (Δx² + Δy² + (Δx·v − Δy·u)²) in nodes, (u, v) where the particle
+// stands on the plane one unit from a point light, else 0. Where form is 0 it is a tent over a cell. Where it is curved the
+// light is near: (u, v) is the node's, and form is to be divided by 1 + u² + v².
 struct GridKernel {
   float x;              // [nodes from the tile's corner]
   float y;
   float depth;          // of the middle [bins from the tile's base]
-  float inverseRadius;  // [1 / bins]
-  float a;
-  float b;
-  float c;
   float scale;          // of the weights: optical depth; with three channels for a peak of 1
+  float form;           // [1 / nodes²]
+  float slope;          // 1 / the q from which on weights of the smooth falloff are 0
+  float curved;         // 1 or 0
+  float inverseRadius;  // [1 / bins]
 };
 MOTE_ASSERT_OFFSET(GridKernel, x, 0);
 MOTE_ASSERT_OFFSET(GridKernel, y, 4);
 MOTE_ASSERT_OFFSET(GridKernel, depth, 8);
-MOTE_ASSERT_OFFSET(GridKernel, inverseRadius, 12);
-MOTE_ASSERT_OFFSET(GridKernel, a, 16);
-MOTE_ASSERT_OFFSET(GridKernel, b, 20);
-MOTE_ASSERT_OFFSET(GridKernel, c, 24);
-MOTE_ASSERT_OFFSET(GridKernel, scale, 28);
+MOTE_ASSERT_OFFSET(GridKernel, scale, 12);
+MOTE_ASSERT_OFFSET(GridKernel, form, 16);
+MOTE_ASSERT_OFFSET(GridKernel, slope, 20);
+MOTE_ASSERT_OFFSET(GridKernel, curved, 24);
+MOTE_ASSERT_OFFSET(GridKernel, inverseRadius, 28);
 MOTE_ASSERT_SIZE(GridKernel, 32);
 
 // The particles of one group of bins on 4 × 4 nodes, or some of them: what one lane sums up.
 struct GridWork {
-  uint first;    // entries; even
+  uint first;    // entries; a multiple of kEntriesAtOnce
   uint end;      // > first
   uint sums;     // where its kBlockPairs sums go, [bin][row][column]
   float bin;     // the group's first [bins from the tile's base]
   float column;  // of the first node [nodes from the tile's corner]
   float row;
-  float u;       // where that node stands on the plane one unit from a point light
+  float u;       // where that node stands on the plane one unit from a point light; else 0
   float v;
+  float inverseRadius;  // of its particles, where all have one
 };
 MOTE_BUFFER(GridWorkBuffer, GridWork)
 MOTE_ASSERT_OFFSET(GridWork, first, 0);
@@ -60,7 +59,8 @@ MOTE_ASSERT_OFFSET(GridWork, column, 16);
 MOTE_ASSERT_OFFSET(GridWork, row, 20);
 MOTE_ASSERT_OFFSET(GridWork, u, 24);
 MOTE_ASSERT_OFFSET(GridWork, v, 28);
-MOTE_ASSERT_SIZE(GridWork, 32);
+MOTE_ASSERT_OFFSET(GridWork, inverseRadius, 32);
+MOTE_ASSERT_SIZE(GridWork, 36);
 
 // Works through the depth over the same 4 × 4 nodes, or some of them. Neighbours may have one stored block.
 struct GridStrand {
@@ -85,14 +85,18 @@ MOTE_ASSERT_OFFSET(GridPair, after, 4);
 MOTE_ASSERT_SIZE(GridPair, 8);
 
 // Where a group's depths over a tile's 4 × 4 nodes are: 2 · stored block, + 1 where it is of the group, else of one before.
-struct GridEntryPair {
+struct GridPlaces {
   uint here;
   uint right;  // of the next 4 columns
+  uint below;  // of the next 4 rows
+  uint belowRight;
 };
-MOTE_BUFFER(GridEntryPairBuffer, GridEntryPair)
-MOTE_ASSERT_OFFSET(GridEntryPair, here, 0);
-MOTE_ASSERT_OFFSET(GridEntryPair, right, 4);
-MOTE_ASSERT_SIZE(GridEntryPair, 8);
+MOTE_BUFFER(GridPlacesBuffer, GridPlaces)
+MOTE_ASSERT_OFFSET(GridPlaces, here, 0);
+MOTE_ASSERT_OFFSET(GridPlaces, right, 4);
+MOTE_ASSERT_OFFSET(GridPlaces, below, 8);
+MOTE_ASSERT_OFFSET(GridPlaces, belowRight, 12);
+MOTE_ASSERT_SIZE(GridPlaces, 16);
 
 struct GridReceiver {
   float x;     // [nodes from the tile's corner]
@@ -115,11 +119,11 @@ struct GridParams {
   MOTE_ADDRESS(UintBuffer) blocks;       // the stored block of each work, by its sums
   MOTE_ADDRESS(GridStrandBuffer) strands;
   MOTE_ADDRESS(GridPairBuffer) stored;   // kBlockPairs a block
-  MOTE_ADDRESS(GridEntryPairBuffer) table;  // tile by tile, [group][block of the tile]
+  MOTE_ADDRESS(GridPlacesBuffer) table;  // tile by tile, [group][block of the tile]
   MOTE_ADDRESS(GridReceiverBuffer) receivers;
   MOTE_ADDRESS(FloatBuffer) depths;      // in: what each receiver would find of its own particle; out: what it finds
   uint count;                            // of works, strands or receivers
-  float cell;                            // [on the plane one unit from a point light]
+  float cell;                            // [on the plane one unit from a point light]; else 0
 };
 MOTE_ASSERT_OFFSET(GridParams, peaks, 0);
 MOTE_ASSERT_OFFSET(GridParams, works, 8);
