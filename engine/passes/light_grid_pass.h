@@ -29,11 +29,10 @@ class LightGridPass {
   /// As mote::gridOpticalDepths, T within 2e-5 of it; the same bits each time, whatever the device's budget (tested on
   /// lavapipe; a driver may contract the pipelines of parts otherwise). Tiles go through the device in batches of about
   /// 64 MiB, or what the budget leaves of it. Each takes there 32 bytes a particle (44 with three channels), 4 for each
-  /// block that it touches, 20 a receiver (28), and 804 a block that is touched. A tile that does not fit goes in parts
+  /// block that it touches, 20 a receiver (28), and 808 a block that is touched. A tile that does not fit goes in parts
   /// (grid_parts.h), one channel after the other; throws MachineError where not even the least fits, which is 0.2 MiB
   /// at most. The host holds about the same as the device, without what is stored, of a million particles and receivers
-  /// at a time, or of one tile. On lavapipe 3.5 times the CPU time of gridOpticalDepths at cells of a radius, as that
-  /// goes by patches there, and 2.4 at 0.35.
+  /// at a time, or of one tile. On lavapipe 3 times the CPU time of gridOpticalDepths (docs/performance.md).
   std::vector<float> opticalDepths(const Octree& tree, const Receivers& receivers, const layout::Light& light,
                                    const LightingOptions& options, const GridResolution& resolution,
                                    std::span<const std::uint8_t> reached = {}, const RaysDone& done = {});
