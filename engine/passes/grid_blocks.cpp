@@ -75,8 +75,7 @@ void GridBlocks::setKernels(GridTile& tile, GridArrays& to) {
   MOTE_CHECK(groups_, <=, std::size_t{std::numeric_limits<std::uint16_t>::max()});
   const auto groups = static_cast<std::uint32_t>(groups_);
   const int lastGroup = tile.firstGroup + static_cast<int>(tile.groupAt.size()) - 1;
-  // Beyond the end: where blocks are counted that a kernel has not.
-  start_.assign((kBlocks + layout::kTileBlocks + 2) * groups_ + 4, 0);
+  start_.assign(kBlocks * groups_ + 2, 0);
   std::uint32_t* const counts = start_.data() + 2;  // sortEntries
   inverseRadius_ = count > 0 ? to.kernels.front().inverseRadius : 0;
   const auto alike = [&](float radius) { return radius == p.depthRadius.front(); };
@@ -93,7 +92,7 @@ void GridBlocks::setKernels(GridTile& tile, GridArrays& to) {
                       static_cast<std::uint8_t>(blocks.columns), static_cast<std::uint8_t>(blocks.rows)};
     places_[i] = place;
     to.kinds |= kindOf(to.kernels[i]);
-    forEachBlock(place, groups, [&](std::uint32_t at, std::uint32_t really) { counts[at] += really; });
+    forEachBlock(place, groups, [&](std::uint32_t at) { ++counts[at]; });
   }
 }
 
@@ -123,31 +122,26 @@ CoveredNodes GridBlocks::setLone(GridTile& tile, std::size_t i, layout::GridKern
   return nodes;
 }
 
-/// `add(at, really)` for each block and group of a place, and for some beside it, where `really` is 0: of the usual
-/// sizes always eight, as a loop whose end is a guess takes longer.
+/// `add(at)` for each block and group of a place. The usual sizes branch, as neighbours mostly have the same: loops
+/// over them take longer.
 template <class Add>
 void GridBlocks::forEachBlock(const Place& place, std::uint32_t groups, const Add& add) {
-  const std::uint32_t rowStep = layout::kTileBlocks * groups;
+  const std::uint32_t at = place.first, rowStep = layout::kTileBlocks * groups;
   if (place.rows <= 2 && place.columns <= 2 && place.groups <= 2) {
     if (place.groups == 0) return;
-    const bool deep = place.groups > 1;
-    const std::uint32_t at = place.first;
-    const auto both = [&](std::uint32_t from) {
-      add(from, 1u);
-      if (deep) add(from + 1, 1u);
+    const auto addGroups = [&](std::uint32_t from) {
+      add(from);
+      if (place.groups > 1) add(from + 1);
     };
-    both(at);
-    if (place.columns > 1) both(at + groups);
-    if (place.rows > 1) {
-      both(at + rowStep);
-      if (place.columns > 1) both(at + rowStep + groups);
-    }
+    addGroups(at);
+    if (place.columns > 1) addGroups(at + groups);
+    if (place.rows > 1) addGroups(at + rowStep);
+    if (place.rows > 1 && place.columns > 1) addGroups(at + rowStep + groups);
     return;
   }
   for (std::uint32_t row = 0; row < place.rows; ++row)
     for (std::uint32_t column = 0; column < place.columns; ++column)
-      for (std::uint32_t group = 0; group < place.groups; ++group)
-        add(place.first + row * rowStep + column * groups + group, 1u);
+      for (std::uint32_t group = 0; group < place.groups; ++group) add(at + row * rowStep + column * groups + group);
 }
 
 void GridBlocks::sortEntries(GridArrays& to) {
@@ -163,13 +157,8 @@ void GridBlocks::sortEntries(GridArrays& to) {
   to.entries.resize(all);
   std::uint32_t *const next = start_.data() + 1, *const entries = to.entries.data();
   const auto groups = static_cast<std::uint32_t>(groups_);
-  std::uint32_t nowhere = 0;
   for (std::size_t i = 0; i < places_.size(); ++i)
-    forEachBlock(places_[i], groups, [&](std::uint32_t at, std::uint32_t really) {
-      const std::uint32_t place = next[at];
-      *(really != 0 ? entries + place : &nowhere) = static_cast<std::uint32_t>(i);
-      next[at] = place + really;
-    });
+    forEachBlock(places_[i], groups, [&](std::uint32_t at) { entries[next[at]++] = static_cast<std::uint32_t>(i); });
 }
 
 void GridBlocks::setWorks(const GridTile& tile, GridArrays& to) const {
@@ -194,9 +183,10 @@ void GridBlocks::setWorks(const GridTile& tile, GridArrays& to) const {
     std::uint32_t last = 0;
     for (std::size_t g = 0; g < groups_; ++g) {
       const std::uint32_t first = roomForEntries(start_[b * groups_ + g]), end = start_[b * groups_ + g + 1];
-      if (first < end) last = 2 * ++to.storedBlocks;
-      if (first < end)
+      if (first < end) {
+        last = 2 * ++to.storedBlocks;
         std::fill(to.entries.begin() + end, to.entries.begin() + roomForEntries(end), to.entries[end - 1]);
+      }
       const std::uint32_t entry = last + (first < end ? 1 : 0);
       to.table[g * kBlocks + b].here = entry;
       if (b >= 1) to.table[g * kBlocks + b - 1].right = entry;

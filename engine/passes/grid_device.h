@@ -82,7 +82,7 @@ class GridDevice {
 
   const Device& device_;
   TimestampQueries queries_;
-  std::uint32_t readGroupSize_;  // a workgroup costs lavapipe an allocation, as much as three receivers
+  std::uint32_t readGroupSize_;  // a workgroup costs lavapipe an allocation, some 50 ns
   std::uint32_t groupSize_;      // of the others, whose lanes do much more: what balances its threads best
   std::map<FillVariant, ComputePipeline> fills_;
   std::array<ComputePipeline, 2> sums_;  // the second where blocks may have been begun

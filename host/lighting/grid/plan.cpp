@@ -151,7 +151,7 @@ class Binning {
     for (std::size_t slot = begin; slot < end; ++slot) {
       const std::size_t home = located.key[slot] == kNoTile ? TileLookup::kNone : lookup(located.key[slot]);
       if (home != TileLookup::kNone && located.flags[slot] == 0 && reached.empty()) {
-        // Most stand within their tile, and so do their neighbours.
+        // Most stand within their tile, and so do their neighbours: a run.
         std::size_t last = slot + 1;
         while (last < end && located.key[last] == located.key[slot] && located.flags[last] == 0) ++last;
         put(2 * home, static_cast<std::uint32_t>(slot), static_cast<std::uint32_t>(last));
